@@ -1,0 +1,2 @@
+//! The command line: see `mesoshell --help`.
+fn main() {}

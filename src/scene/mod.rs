@@ -1,0 +1,62 @@
+//! The scene: what is rendered, from where, and how finely.
+
+pub mod camera;
+
+pub use camera::{Camera, View};
+
+use crate::shell::Shell;
+use crate::volume::Pyramid;
+
+/// A loaded scene: all that a method needs, whatever file it came from.
+#[derive(Debug, Clone)]
+pub struct Scene {
+    /// The geometry.
+    pub shell: Shell,
+    /// The texture that fills it.
+    pub volume: Pyramid,
+    /// How opacity and detail are to be read.
+    pub medium: Medium,
+    /// Where it is seen from, how large, and whether depth is wanted.
+    pub view: View,
+    /// How finely the `shell` method marches.
+    pub march: March,
+}
+
+/// What the texture means. It belongs to the medium, not to the march: the reference obeys it too.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Medium {
+    /// The path length, in world units, whose opacity the texture's alpha is.
+    pub opacity_distance: f64,
+    /// The filter footprint in pixels (1 = one pixel; 0 = always level 0).
+    ///
+    /// At a point at depth `z` (world units along the camera's forward axis) in a tetrahedron the level of
+    /// detail is `log2(lod_footprint * z * pixel * rho)`, clamped to `0..=last level`, where `pixel` is
+    /// [`View::pixel_at_unit_depth`] and `rho` is [`Scene::texels_per_unit`] of that tetrahedron.
+    /// Between integer levels the two levels' premultiplied RGBA are blended linearly.
+    pub lod_footprint: f64,
+}
+
+/// How samples are spread along a ray in one tetrahedron.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum March {
+    /// The 2005 paper, section 5.1: the same number of samples in every tetrahedron.
+    Paper {
+        /// At least 1.
+        samples: u32,
+    },
+    /// Samples by length: `ceil(length / step)`, at least one.
+    Default {
+        /// In texels of the level of detail that the sample is read from; positive.
+        step: f64,
+    },
+}
+
+impl Scene {
+    /// The largest density of level-0 texels along any texture axis in a tetrahedron, in texels per
+    /// world unit: `max_i size_i |row_i of texture_from_world|`.
+    pub fn texels_per_unit(&self, tetrahedron: usize) -> f64 {
+        let map = self.shell.cells[tetrahedron].texture_from_world.transpose();
+        let size = self.volume.levels[0].size;
+        (0..3).map(|i| f64::from(size[i]) * map.col(i).length()).fold(0.0, f64::max)
+    }
+}
