@@ -35,7 +35,7 @@ pub enum Error {
     Text {
         /// The text and its name.
         #[source_code]
-        source_code: Box<NamedSource<String>>,
+        source_code: std::sync::Arc<NamedSource<String>>,
         /// The offending bytes.
         #[label("{label}")]
         span: SourceSpan,
