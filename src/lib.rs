@@ -10,6 +10,7 @@ pub mod error;
 pub mod frame;
 pub mod gpu;
 pub mod mesh;
+pub mod method;
 pub mod metric;
 pub mod order;
 pub mod progress;

@@ -300,7 +300,7 @@ unsafe extern "system" fn hear(
 /// An open device with one queue and a memory allocator.
 pub struct Gpu {
     pub(super) raw: ash::Device,
-    pub(super) queue: vk::Queue,
+    pub(super) queue: Mutex<vk::Queue>,
     pub(super) queue_family: u32,
     pub(super) limits: vk::PhysicalDeviceLimits,
     /// Nanoseconds a timestamp tick, where the queue has timestamps.
@@ -376,7 +376,7 @@ impl Gpu {
         };
         Ok(Arc::new(Self {
             raw,
-            queue,
+            queue: Mutex::new(queue),
             queue_family,
             limits: properties.limits,
             timestamp_period: has_timestamps.then_some(f64::from(properties.limits.timestamp_period)),

@@ -1,6 +1,6 @@
 //! Graphics pipelines that blend front to back, and the one draw call that uses them.
 
-use std::sync::Arc;
+use std::sync::{Arc, PoisonError};
 use std::time::Duration;
 
 use ash::vk;
@@ -460,7 +460,7 @@ pub(super) fn submit(gpu: &Gpu, what: &str, record: impl FnOnce(vk::CommandBuffe
             let work = vk::SubmitInfo::default().command_buffers(&commands);
             let done = gpu
                 .raw
-                .queue_submit(gpu.queue, &[work], fence)
+                .queue_submit(*gpu.queue.lock().unwrap_or_else(PoisonError::into_inner), &[work], fence)
                 .and_then(|()| gpu.raw.wait_for_fences(&[fence], true, u64::MAX));
             gpu.raw.destroy_fence(fence, None);
             done

@@ -1,0 +1,81 @@
+//! Ways of turning a scene into a picture. All share scene, camera and medium, so that comparing them compares
+//! the method alone. A new method is a file here, its shaders, and a line in [`METHODS`].
+
+pub mod reference;
+pub mod shell;
+
+use std::sync::Arc;
+
+use crate::Result;
+use crate::frame::Frame;
+use crate::gpu::{DeviceChoice, Messages};
+use crate::progress::{Interrupt, Progress, Silent};
+use crate::scene::{Scene, View};
+
+/// What a method may use while it prepares and renders.
+#[derive(Clone, Copy)]
+pub struct Setup<'a> {
+    /// The device, for methods that need one.
+    pub device: &'a DeviceChoice,
+    /// Where the Vulkan validation layers report, if they are to watch.
+    pub validation: Option<&'a Messages>,
+    /// Hears of the stages.
+    pub progress: &'a Arc<dyn Progress>,
+    /// Stops the run.
+    pub interrupt: &'a Interrupt,
+}
+
+/// A method that holds a prepared scene.
+pub trait Method {
+    /// Renders one view. The scene's own is `scene.view`.
+    ///
+    /// # Errors
+    /// [`Error::Device`](crate::Error::Device), [`Error::OutOfMemory`](crate::Error::OutOfMemory), or
+    /// [`Error::Interrupted`](crate::Error::Interrupted).
+    fn render(&mut self, view: &View) -> Result<Frame>;
+}
+
+/// A line of the table of methods.
+pub struct Entry {
+    /// As given to `--method`.
+    pub name: &'static str,
+    /// One line for the help text.
+    pub summary: &'static str,
+    /// Takes a scene to the method: uploads, builds what does not depend on the view.
+    pub prepare: fn(Arc<Scene>, &Setup<'_>) -> Result<Box<dyn Method>>,
+}
+
+/// All methods; the first is the default.
+pub const METHODS: &[Entry] = &[
+    Entry {
+        name: "shell",
+        summary: "tetrahedra in visibility order, marched on the device",
+        prepare: shell::prepare,
+    },
+    Entry {
+        name: "reference",
+        summary: "the integral itself in f64, on the CPU; slow and exact",
+        prepare: reference::prepare,
+    },
+];
+
+/// The method of that name.
+pub fn by_name(name: &str) -> Option<&'static Entry> {
+    METHODS.iter().find(|entry| entry.name == name)
+}
+
+/// Renders the scene's own view with the `shell` method on the best device, silently: the shortest way to a picture.
+///
+/// # Errors
+/// As [`Method::render`].
+pub fn render(scene: Scene) -> Result<Frame> {
+    let view = scene.view;
+    let progress: Arc<dyn Progress> = Arc::new(Silent);
+    let setup = Setup {
+        device: &DeviceChoice::Any,
+        validation: None,
+        progress: &progress,
+        interrupt: &Interrupt::default(),
+    };
+    shell::prepare(Arc::new(scene), &setup)?.render(&view)
+}
