@@ -1,5 +1,7 @@
 //! Volumes: RGBA 3D textures, their files, recipes and mip pyramids.
 
+pub mod recipe;
+
 /// An RGBA 3D texture in texture space (u, v, w).
 ///
 /// Alpha is the opacity, 0..1, of a path of one `opacity_distance`; colour is linear and
