@@ -8,6 +8,7 @@
 
 pub mod error;
 pub mod frame;
+pub mod gpu;
 pub mod mesh;
 pub mod metric;
 pub mod order;

@@ -1,0 +1,157 @@
+//! Buffers that the host writes or reads and the device reads or writes.
+
+use std::mem::ManuallyDrop;
+use std::sync::{Arc, PoisonError};
+
+use ash::vk;
+use gpu_allocator::MemoryLocation;
+use gpu_allocator::vulkan::{Allocation, AllocationCreateDesc, AllocationScheme};
+
+use super::device::{Gpu, vulkan_error};
+use crate::{Error, Result};
+
+/// Mapped memory of one fixed size.
+#[derive(Debug)]
+pub struct Buffer {
+    pub(super) raw: vk::Buffer,
+    pub(super) bytes: u64,
+    name: &'static str,
+    allocation: ManuallyDrop<Allocation>,
+    gpu: Arc<Gpu>,
+}
+
+impl Buffer {
+    /// A storage buffer that shaders read, filled with `data`.
+    ///
+    /// # Errors
+    /// [`Error::OutOfMemory`]; [`Error::Device`] where `data` is larger than the device's storage buffers.
+    pub fn storage<T: bytemuck::NoUninit>(gpu: &Arc<Gpu>, name: &'static str, data: &[T]) -> Result<Self> {
+        let bytes = size_of_val(data).max(4) as u64;
+        let limit = u64::from(gpu.limits.max_storage_buffer_range);
+        if bytes > limit {
+            return Err(Error::Device {
+                message: format!(
+                    "{name}: {bytes} bytes are more than the device's storage buffers hold ({limit})"
+                ),
+                help: Some("use a mesh with fewer triangles".into()),
+            });
+        }
+        let mut buffer =
+            Self::new(gpu, name, bytes, vk::BufferUsageFlags::STORAGE_BUFFER, MemoryLocation::CpuToGpu)?;
+        buffer.write(data);
+        Ok(buffer)
+    }
+
+    pub(super) fn staging<T: bytemuck::NoUninit>(
+        gpu: &Arc<Gpu>,
+        name: &'static str,
+        data: &[T],
+    ) -> Result<Self> {
+        let bytes = size_of_val(data) as u64;
+        let mut buffer =
+            Self::new(gpu, name, bytes, vk::BufferUsageFlags::TRANSFER_SRC, MemoryLocation::CpuToGpu)?;
+        buffer.write(data);
+        Ok(buffer)
+    }
+
+    pub(super) fn readback(gpu: &Arc<Gpu>, name: &'static str, bytes: u64) -> Result<Self> {
+        Self::new(gpu, name, bytes, vk::BufferUsageFlags::TRANSFER_DST, MemoryLocation::GpuToCpu)
+    }
+
+    fn new(
+        gpu: &Arc<Gpu>,
+        name: &'static str,
+        bytes: u64,
+        usage: vk::BufferUsageFlags,
+        location: MemoryLocation,
+    ) -> Result<Self> {
+        gpu.check_memory(name, bytes)?;
+        let info = vk::BufferCreateInfo::default().size(bytes).usage(usage);
+        // SAFETY: the size is at least 1 and the device outlives the buffer, which holds it.
+        let raw = unsafe { gpu.raw.create_buffer(&info, None) }
+            .map_err(|error| vulkan_error(&format!("creating the buffer of {name}"), error))?;
+        // SAFETY: `raw` was just made by this device.
+        let requirements = unsafe { gpu.raw.get_buffer_memory_requirements(raw) };
+        let allocation = match allocate(gpu, name, requirements, location, true) {
+            Ok(allocation) => allocation,
+            Err(error) => {
+                // SAFETY: nothing uses the buffer yet.
+                unsafe { gpu.raw.destroy_buffer(raw, None) };
+                return Err(error);
+            }
+        };
+        let buffer = Self { raw, bytes, name, allocation: ManuallyDrop::new(allocation), gpu: gpu.clone() };
+        // SAFETY: the allocation meets the buffer's requirements and is bound once.
+        unsafe { gpu.raw.bind_buffer_memory(raw, buffer.allocation.memory(), buffer.allocation.offset()) }
+            .map_err(|error| vulkan_error(&format!("binding the memory of {name}"), error))?;
+        Ok(buffer)
+    }
+
+    /// Overwrites the first `data.len()` elements.
+    ///
+    /// # Panics
+    /// Where `data` is longer than the buffer.
+    pub fn write<T: bytemuck::NoUninit>(&mut self, data: &[T]) {
+        let bytes: &[u8] = bytemuck::cast_slice(data);
+        let name = self.name;
+        let mapped = self
+            .allocation
+            .mapped_slice_mut()
+            .unwrap_or_else(|| panic!("{name} lies in host-visible memory"));
+        mapped[..bytes.len()].copy_from_slice(bytes);
+    }
+
+    /// How many elements of `T` fit.
+    pub fn capacity<T>(&self) -> usize {
+        usize::try_from(self.bytes).expect("mapped memory fits the address space") / size_of::<T>()
+    }
+
+    /// The buffer's contents.
+    pub(super) fn read(&self) -> &[u8] {
+        let mapped = self.allocation.mapped_slice().expect("readback memory is host-visible");
+        &mapped[..usize::try_from(self.bytes).expect("mapped memory fits the address space")]
+    }
+}
+
+impl Drop for Buffer {
+    fn drop(&mut self) {
+        // SAFETY: every submission that used the buffer was waited for; it is not used again.
+        unsafe {
+            self.gpu.raw.destroy_buffer(self.raw, None);
+            free(&self.gpu, &mut self.allocation);
+        }
+    }
+}
+
+pub(super) fn allocate(
+    gpu: &Gpu,
+    name: &str,
+    requirements: vk::MemoryRequirements,
+    location: MemoryLocation,
+    linear: bool,
+) -> Result<Allocation> {
+    let description = AllocationCreateDesc {
+        name,
+        requirements,
+        location,
+        linear,
+        allocation_scheme: AllocationScheme::GpuAllocatorManaged,
+    };
+    gpu.allocator.lock().unwrap_or_else(PoisonError::into_inner).allocate(&description).map_err(|error| {
+        Error::OutOfMemory {
+            message: format!("no {} MiB of device memory for {name}: {error}", requirements.size >> 20),
+            help: Some("use a smaller picture, volume or mesh".into()),
+        }
+    })
+}
+
+/// Returns memory to the allocator.
+///
+/// # Safety
+/// The allocation is not used again, by the host or the device.
+pub(super) unsafe fn free(gpu: &Gpu, allocation: &mut ManuallyDrop<Allocation>) {
+    // SAFETY: the caller gives it up.
+    let allocation = unsafe { ManuallyDrop::take(allocation) };
+    let freed = gpu.allocator.lock().unwrap_or_else(PoisonError::into_inner).free(allocation);
+    debug_assert!(freed.is_ok(), "{freed:?}");
+}

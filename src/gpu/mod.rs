@@ -1,0 +1,20 @@
+//! The device layer: the only place with `ash` and `unsafe`.
+//!
+//! Everything here is safe to call. Objects hold the [`Gpu`] that made them, so that nothing outlives its
+//! device. Work is recorded, submitted and waited for one call at a time: there is one queue, and the
+//! one barrier policy is that a submission sees all that the host wrote before it, and the host sees all that a
+//! submission wrote once the call returns.
+#![allow(unsafe_code, reason = "Vulkan is called here, and nowhere else")]
+
+pub mod buffer;
+pub mod device;
+pub mod draw;
+pub mod shaders;
+pub mod target;
+pub mod texture;
+
+pub use buffer::Buffer;
+pub use device::{DeviceChoice, DeviceInfo, Gpu, Messages, devices};
+pub use draw::{Draw, DrawTimes, Pipeline, PipelineInfo, draw};
+pub use target::Target;
+pub use texture::Texture3d;
