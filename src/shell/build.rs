@@ -162,3 +162,98 @@ fn validate(mesh: &Mesh, options: &ShellOptions) -> Result<()> {
     }
     Ok(())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn triangle() -> Mesh {
+        Mesh {
+            positions: vec![DVec3::ZERO, DVec3::X, DVec3::Y],
+            normals: vec![DVec3::Z; 3],
+            triangles: vec![[0, 1, 2]],
+            uvs: vec![[DVec2::ZERO, DVec2::X, DVec2::Y]],
+        }
+    }
+
+    /// Asserts that the options and the mesh, once spoiled, are refused as usage, in these words.
+    fn assert_refused(words: &str, spoil: impl Fn(&mut ShellOptions, &mut Mesh)) {
+        let (mut options, mut mesh) = (ShellOptions::new(1.0), triangle());
+        Shell::build(&mesh, &options).expect("sound before it is spoiled");
+        spoil(&mut options, &mut mesh);
+        let error = Shell::build(&mesh, &options).expect_err(words);
+        assert!(matches!(error, Error::Usage { help: Some(_), .. }), "{error:?}");
+        assert!(error.to_string().contains(words), "{error} does not say: {words}");
+    }
+
+    #[test]
+    fn a_senseless_thickness_is_refused() {
+        for thickness in [0.0, -0.0, -1.0, f64::NAN, f64::INFINITY] {
+            assert_refused("shell.thickness is", |options, _| options.thickness = thickness);
+        }
+    }
+
+    #[test]
+    fn a_senseless_scale_is_refused() {
+        for scale in [-1.0, f64::NAN, f64::INFINITY] {
+            assert_refused("shell.thickness_scale[1] is", |options, _| {
+                options.thickness_scale = vec![0.0, scale, 1.0];
+            });
+        }
+        assert_refused("shell.thickness_scale has 2 entries for 3", |options, _| {
+            options.thickness_scale = vec![1.0; 2];
+        });
+    }
+
+    #[test]
+    fn numbers_that_are_not_finite_are_refused() {
+        assert_refused("shell.uv_scale is", |options, _| options.uv_scale.x = f64::NAN);
+        assert_refused("shell.uv_offset is", |options, _| options.uv_offset.y = f64::INFINITY);
+        assert_refused("mesh position 2 is", |_, mesh| mesh.positions[2].z = f64::NAN);
+        assert_refused("mesh normal 0 is", |_, mesh| mesh.normals[0].x = f64::NEG_INFINITY);
+        assert_refused("UVs of mesh triangle 0", |_, mesh| mesh.uvs[0][1].x = f64::NAN);
+        assert_refused("UVs of mesh triangle 0", |options, mesh| {
+            options.uv_scale.x = 1e300;
+            mesh.uvs[0][1].x = 1e300;
+        });
+    }
+
+    #[test]
+    fn lists_of_the_wrong_length_are_refused() {
+        assert_refused("2 normals for 3 positions", |_, mesh| mesh.normals.truncate(2));
+        assert_refused("UVs for 0 of 1 triangles", |_, mesh| mesh.uvs.clear());
+    }
+
+    #[test]
+    fn whole_turns_of_u_and_v_are_taken_off_together() {
+        let uvs = [DVec2::new(7.25, -3.5), DVec2::new(9.0, -3.75), DVec2::new(7.5, -1.0)];
+        let texture = texture_coordinates(uvs, [false, false, true, true], [0, 1, 2, 1]);
+        let expected = [
+            DVec3::new(0.25, 0.5, 0.0),
+            DVec3::new(2.0, 0.25, 0.0),
+            DVec3::new(0.5, 3.0, 1.0),
+            DVec3::new(2.0, 0.25, 1.0),
+        ];
+        assert_eq!(texture, expected);
+    }
+
+    #[test]
+    fn options_move_the_texture() {
+        let options = ShellOptions {
+            uv_scale: DVec2::new(2.0, 4.0),
+            uv_offset: DVec2::splat(0.25),
+            ..ShellOptions::new(1.0)
+        };
+        let shell = Shell::build(&triangle(), &options).unwrap();
+        let corner = |u, v| DVec3::new(u, v, 0.0);
+        let expected = [corner(0.25, 0.25), corner(2.25, 0.25), corner(0.25, 4.25)];
+        assert_eq!(shell.texture[0][..3], expected);
+    }
+
+    #[test]
+    fn the_scale_is_per_position() {
+        let options = ShellOptions { thickness_scale: vec![0.0, 1.0, 2.0], ..ShellOptions::new(0.5) };
+        let shell = Shell::build(&triangle(), &options).unwrap();
+        assert_eq!([3, 4, 5].map(|id| shell.vertices[id].z), [0.0, 0.5, 1.0]);
+    }
+}

@@ -51,3 +51,73 @@ fn directed_edges(mesh: &Mesh) -> Vec<(u32, u32)> {
     edges.dedup();
     edges
 }
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec2;
+
+    use super::*;
+
+    /// A fan of four triangles around vertex 0, whose direction alone is tilted.
+    fn fan() -> Mesh {
+        Mesh {
+            positions: vec![DVec3::ZERO, DVec3::X, DVec3::Y, -DVec3::X, -DVec3::Y],
+            normals: vec![DVec3::X, DVec3::Z, DVec3::Z, DVec3::Z, DVec3::Z],
+            triangles: vec![[0, 1, 2], [0, 2, 3], [0, 3, 4], [0, 4, 1]],
+            uvs: vec![[DVec2::ZERO; 3]; 4],
+        }
+    }
+
+    fn after(rounds: u32, mesh: &Mesh) -> Vec<DVec3> {
+        directions(mesh, &ShellOptions { smoothing_rounds: rounds, ..ShellOptions::new(1.0) })
+    }
+
+    #[test]
+    fn no_rounds_keep_the_normals() {
+        assert_eq!(after(0, &fan()), fan().normals);
+    }
+
+    #[test]
+    fn a_round_is_the_even_mean_over_the_edges() {
+        let smooth = after(1, &fan());
+        // The hub sees itself and four rim vertices; a rim vertex sees itself, the hub and two others.
+        let expected = [DVec3::new(1.0, 0.0, 4.0), DVec3::new(1.0, 0.0, 3.0)].map(DVec3::normalize);
+        assert!(smooth[0].distance(expected[0]) < 1e-15 && smooth[3].distance(expected[1]) < 1e-15);
+        assert!(smooth[0].distance(expected[1]) > 1e-2, "the comparison can fail");
+    }
+
+    #[test]
+    fn rounds_even_out_and_stay_of_unit_length() {
+        let smooth = after(50, &fan());
+        for direction in &smooth {
+            assert!((direction.length() - 1.0).abs() < 1e-15);
+            assert!(direction.distance(smooth[0]) < 1e-9);
+        }
+    }
+
+    #[test]
+    fn the_order_of_triangles_changes_no_bit() {
+        let mut mesh = fan();
+        mesh.normals = (0..5).map(|i| DVec3::new(0.1 * f64::from(i), 0.3, 0.7).normalize()).collect();
+        let smooth = after(3, &mesh);
+        mesh.triangles = vec![[4, 1, 0], [3, 0, 2], [1, 2, 0], [0, 3, 4]];
+        assert_eq!(after(3, &mesh), smooth);
+        mesh.normals[4].x += 1e-12;
+        assert_ne!(after(3, &mesh), smooth);
+    }
+
+    #[test]
+    fn directions_that_cancel_stay() {
+        let mesh = Mesh {
+            positions: vec![DVec3::ZERO, DVec3::X, DVec3::Y],
+            normals: vec![
+                DVec3::Z,
+                DVec3::new(0.0, 0.75f64.sqrt(), -0.5),
+                DVec3::new(0.0, -0.75f64.sqrt(), -0.5),
+            ],
+            triangles: vec![[0, 1, 2]],
+            uvs: vec![[DVec2::ZERO; 3]],
+        };
+        assert_eq!(after(1, &mesh), mesh.normals);
+    }
+}

@@ -89,3 +89,53 @@ fn quality([a, b, c, d]: [DVec3; 4], determinant: f64) -> f64 {
     let mean_square = edges.iter().map(|edge| edge.length_squared()).sum::<f64>() / 6.0;
     SQRT_2 * determinant.abs() / (mean_square * mean_square.sqrt())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::shell::cell;
+
+    const REGULAR: [DVec3; 4] = [
+        DVec3::new(1.0, 1.0, 1.0),
+        DVec3::new(1.0, -1.0, -1.0),
+        DVec3::new(-1.0, 1.0, -1.0),
+        DVec3::new(-1.0, -1.0, 1.0),
+    ];
+
+    #[test]
+    fn quality_is_one_when_regular_at_any_scale_and_less_otherwise() {
+        for scale in [1e-6, 1.0, 1e6] {
+            let vertices = REGULAR.map(|v| scale * v);
+            // Ten or so roundings.
+            assert!((quality(vertices, cell::determinant(vertices)) - 1.0).abs() < 1e-14);
+        }
+        let mut bent = REGULAR;
+        bent[0].x += 0.1;
+        assert!(quality(bent, cell::determinant(bent)) < 1.0 - 1e-4);
+    }
+
+    /// The corner of a cube lowered to height `h`: `det = h`, squared edges 1, 1, 2, h2, 1 + h2, 1 + h2.
+    #[test]
+    fn quality_of_a_lowered_corner() {
+        let h = 0.01f64;
+        let vertices = [DVec3::ZERO, DVec3::X, DVec3::Y, h * DVec3::Z];
+        let expected = SQRT_2 * h / (1.0 + 0.5 * h * h).powf(1.5);
+        assert!((quality(vertices, h) / expected - 1.0).abs() < 1e-14);
+    }
+
+    #[test]
+    fn faults_are_told_apart() {
+        let faults = |vertices: [DVec3; 4]| {
+            let determinant = cell::determinant(vertices);
+            let found = cell::maps(&vertices, [0, 1, 2, 3], &REGULAR, determinant);
+            let Faults { inverted, zero_volume, slivers } = Faults::of(vertices, determinant, &found);
+            [inverted, zero_volume, slivers]
+        };
+        let lowered = |h: f64| [DVec3::ZERO, DVec3::X, DVec3::Y, h * DVec3::Z];
+        assert_eq!(faults(lowered(1.0)), [0, 0, 0]);
+        assert_eq!(faults(lowered(-1.0)), [1, 0, 0]);
+        assert_eq!(faults(lowered(0.0)), [0, 1, 0]);
+        assert_eq!(faults(lowered(1e-4)), [0, 0, 1]);
+        assert_eq!(faults(lowered(-1e-4)), [1, 0, 1]);
+    }
+}

@@ -178,3 +178,88 @@ fn is_odd(permutation: [usize; 3]) -> bool {
 fn place_of<T: PartialEq>(item: T, items: [T; 4]) -> usize {
     items.iter().position(|x| *x == item).expect("the split names each prism vertex where it stands")
 }
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+
+    use glam::{DVec2, DVec3};
+
+    use super::*;
+
+    fn topology(triangles: &[[u32; 3]]) -> Result<Topology> {
+        let positions = triangles.iter().flatten().max().map_or(0, |&id| id as usize + 1);
+        Topology::of(&Mesh {
+            positions: vec![DVec3::ZERO; positions],
+            normals: vec![DVec3::Z; positions],
+            triangles: triangles.to_vec(),
+            uvs: vec![[DVec2::ZERO; 3]; triangles.len()],
+        })
+    }
+
+    fn as_sets(tetrahedra: &[[u32; 4]]) -> Vec<BTreeSet<u32>> {
+        tetrahedra.iter().map(|ids| ids.iter().copied().collect()).collect()
+    }
+
+    fn interior_faces(topology: &Topology) -> usize {
+        topology.neighbours.iter().flatten().filter(|&&t| t != EXTERIOR).count()
+    }
+
+    #[test]
+    fn every_winding_gives_the_designs_three_tetrahedra() {
+        let designed = as_sets(&[[0, 1, 2, 5], [0, 1, 4, 5], [0, 3, 4, 5]]);
+        for triangle in [[0, 1, 2], [1, 2, 0], [2, 0, 1], [0, 2, 1], [2, 1, 0], [1, 0, 2]] {
+            let topology = topology(&[triangle]).unwrap();
+            assert_eq!(as_sets(&topology.tetrahedra), designed);
+            for (ids, corners) in topology.tetrahedra.iter().zip(&topology.corners) {
+                assert_eq!(corners.map(|corner| triangle[corner as usize]), ids.map(|id| id % 3));
+            }
+            assert_eq!(interior_faces(&topology), 4, "two shared faces, seen from both sides");
+        }
+        let other = topology(&[[0, 1, 3]]).unwrap();
+        assert_ne!(as_sets(&other.tetrahedra), designed);
+    }
+
+    #[test]
+    fn an_edge_of_two_opposed_triangles_joins_their_prisms() {
+        let topology = topology(&[[0, 1, 2], [2, 1, 3]]).unwrap();
+        assert_eq!((topology.boundary_edges, topology.non_manifold_edges), (4, 0));
+        assert_eq!(interior_faces(&topology), 2 * 4 + 2 * 2);
+    }
+
+    #[test]
+    fn an_edge_of_two_triangles_that_run_the_same_way_is_exterior() {
+        let topology = topology(&[[0, 1, 2], [1, 2, 3]]).unwrap();
+        assert_eq!((topology.boundary_edges, topology.non_manifold_edges), (4, 1));
+        assert_eq!(interior_faces(&topology), 2 * 4);
+    }
+
+    #[test]
+    fn an_edge_of_three_triangles_is_exterior() {
+        let topology = topology(&[[0, 1, 2], [1, 0, 3], [0, 1, 4]]).unwrap();
+        assert_eq!((topology.boundary_edges, topology.non_manifold_edges), (6, 1));
+        assert_eq!(interior_faces(&topology), 3 * 4);
+    }
+
+    #[test]
+    fn a_sheet_with_two_sides_is_closed() {
+        let topology = topology(&[[0, 1, 2], [0, 2, 1]]).unwrap();
+        assert_eq!((topology.boundary_edges, topology.non_manifold_edges), (0, 0));
+        assert_eq!(interior_faces(&topology), 2 * 4 + 3 * 4);
+    }
+
+    #[test]
+    fn no_triangles_make_an_empty_topology() {
+        assert_eq!(topology(&[]).unwrap(), Topology::default());
+    }
+
+    #[test]
+    fn a_triangle_that_names_a_position_twice_or_one_too_many_is_refused() {
+        let message = topology(&[[0, 1, 2], [3, 1, 3]]).unwrap_err().to_string();
+        assert!(message.contains("triangle 1 (3, 1, 3) names a position twice"), "{message}");
+
+        let mesh = Mesh { triangles: vec![[0, 1, 2]], positions: vec![DVec3::ZERO; 2], ..Mesh::default() };
+        let message = Topology::of(&mesh).unwrap_err().to_string();
+        assert!(message.contains("does not exist; there are 2 positions"), "{message}");
+    }
+}
