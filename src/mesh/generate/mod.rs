@@ -21,11 +21,11 @@ pub use vase::Vase;
 use super::Mesh;
 use crate::{Error, Result};
 
-/// A mesh generator and its parameters, as a TOML table: `generator = "sphere"`, `radius = 1.0`, ...
+/// A mesh generator and its parameters, as a TOML table in a table: `[sphere]`, `radius = 1.0`, ...
 ///
 /// Every parameter may be left out; a key that the generator does not have is an error.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
-#[serde(tag = "generator", rename_all = "kebab-case")]
+#[serde(rename_all = "kebab-case")]
 pub enum Generator {
     /// A square in the XZ plane that faces up.
     Plane(Plane),
@@ -272,9 +272,9 @@ mod tests {
 
     #[test]
     fn reads_from_toml() {
-        let sphere: Generator = toml::from_str("generator = \"sphere\"\nradius = 2.5").unwrap();
+        let sphere: Generator = toml::from_str("[sphere]\nradius = 2.5").unwrap();
         assert_eq!(sphere, Generator::Sphere(Sphere { radius: 2.5, ..Sphere::default() }));
-        let error = toml::from_str::<Generator>("generator = \"sphere\"\nradus = 2.5").unwrap_err();
+        let error = toml::from_str::<Generator>("[sphere]\nradus = 2.5").unwrap_err();
         assert!(error.to_string().contains("radus"), "{error}");
     }
 }
