@@ -147,7 +147,7 @@ impl Pipeline {
             );
         }
         let set_info = vk::DescriptorSetLayoutCreateInfo::default().bindings(&bindings);
-        // SAFETY (this and the calls below): the structures live through the calls; handles are of this device.
+        // SAFETY: the structures live through the call; handles are of this device.
         self.set_layout = unsafe { raw.create_descriptor_set_layout(&set_info, None) }
             .map_err(|error| vulkan_error("describing the bindings", error))?;
         let push = [vk::PushConstantRange {

@@ -35,14 +35,17 @@ pub trait Method {
     fn render(&mut self, view: &View) -> Result<Frame>;
 }
 
+/// Takes a scene to a method: uploads it, builds what does not depend on the view.
+pub type Prepare = fn(Arc<Scene>, &Setup<'_>) -> Result<Box<dyn Method>>;
+
 /// A line of the table of methods.
 pub struct Entry {
     /// As given to `--method`.
     pub name: &'static str,
     /// One line for the help text.
     pub summary: &'static str,
-    /// Takes a scene to the method: uploads, builds what does not depend on the view.
-    pub prepare: fn(Arc<Scene>, &Setup<'_>) -> Result<Box<dyn Method>>,
+    /// See [`Prepare`].
+    pub prepare: Prepare,
 }
 
 /// All methods; the first is the default.

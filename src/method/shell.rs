@@ -114,7 +114,10 @@ pub fn prepare(scene: Arc<Scene>, setup: &Setup<'_>) -> Result<Box<dyn Method>> 
         .tetrahedra
         .par_iter()
         .zip(&scene.shell.texture)
-        .map(|(&vertices, texture)| Tetrahedron { vertices, texture: texture.map(|t| t.as_vec3().extend(0.0).into()) })
+        .map(|(&vertices, texture)| Tetrahedron {
+            vertices,
+            texture: texture.map(|t| t.as_vec3().extend(0.0).into()),
+        })
         .collect();
     let tetrahedra = Buffer::storage(&gpu, "the tetrahedra", &tetrahedra)?;
     let sorter = Sorter::new(&scene.shell.topology);
@@ -148,12 +151,13 @@ impl Method for Shell {
         self.progress.stage("uploading the view");
         let kind =
             CanvasKind { width: view.width, height: view.height, depth: view.depth, minified: seen.minified };
-        let canvas = self.canvas(kind, &seen)?;
+        let kept = self.canvas.take();
+        let canvas = self.canvas(kept, kind, &seen)?;
+        let canvas = &*self.canvas.insert(canvas);
         watch.lap("upload");
 
         self.interrupt.check()?;
         self.progress.stage("marching");
-        let canvas = &*canvas;
         let times = draw(
             &self.gpu,
             &Draw {
@@ -173,7 +177,9 @@ impl Method for Shell {
         self.interrupt.check()?;
         let rgba = canvas.target.read(0);
         let depth = view.depth.then(|| {
-            let mean = |[weighted, _, _, alpha]: [f32; 4]| if alpha > 0.0 { weighted / alpha } else { f32::INFINITY };
+            let mean = |[weighted, _, _, alpha]: [f32; 4]| {
+                if alpha > 0.0 { weighted / alpha } else { f32::INFINITY }
+            };
             canvas.target.read(1).into_iter().map(mean).collect()
         });
         watch.lap("read");
@@ -184,22 +190,17 @@ impl Method for Shell {
 }
 
 impl Shell {
-    /// The canvas for this frame, with what was seen written into its buffers.
-    fn canvas(&mut self, kind: CanvasKind, seen: &Seen) -> Result<&mut Canvas> {
-        let reusable = self
-            .canvas
-            .take()
-            .filter(|canvas| canvas.kind == kind && canvas.faces.capacity::<u32>() >= seen.faces.len());
-        let canvas = match reusable {
-            Some(mut canvas) => {
-                canvas.vertices.write(&seen.vertices);
-                canvas.eyes.write(&seen.eyes);
-                canvas.faces.write(&seen.faces);
-                canvas
-            }
-            None => self.new_canvas(kind, seen)?,
+    /// The canvas for this frame, with what was seen in its buffers: the one of the frame before, where it fits.
+    fn canvas(&self, kept: Option<Canvas>, kind: CanvasKind, seen: &Seen) -> Result<Canvas> {
+        let fits =
+            |canvas: &Canvas| canvas.kind == kind && canvas.faces.capacity::<u32>() >= seen.faces.len();
+        let Some(mut canvas) = kept.filter(fits) else {
+            return self.new_canvas(kind, seen);
         };
-        Ok(self.canvas.insert(canvas))
+        canvas.vertices.write(&seen.vertices);
+        canvas.eyes.write(&seen.eyes);
+        canvas.faces.write(&seen.faces);
+        Ok(canvas)
     }
 
     fn new_canvas(&self, kind: CanvasKind, seen: &Seen) -> Result<Canvas> {
@@ -231,7 +232,8 @@ impl Shell {
 
     fn report(&self, sorted: &Sorted, seen: &Seen, rgba: &[[f32; 4]]) -> Report {
         let health = self.scene.shell.health;
-        let mut report = Report { method: "shell".into(), device: self.gpu.info().name.clone(), ..Report::default() };
+        let mut report =
+            Report { method: "shell".into(), device: self.gpu.info().name.clone(), ..Report::default() };
         let mut count = |name: &str, value: u64| report.counts.insert(name.to_owned(), value);
         count("tetrahedra", health.tetrahedra);
         count("tetrahedra_drawn", seen.tetrahedra_drawn);
@@ -276,7 +278,8 @@ fn see(scene: &Scene, sorted: &Sorted, view: &View) -> Seen {
         .par_iter()
         .map(|&vertex| {
             let offset = vertex - eye;
-            let in_view = DVec3::new(offset.dot(frame.right), offset.dot(frame.up), offset.dot(frame.forward));
+            let in_view =
+                DVec3::new(offset.dot(frame.right), offset.dot(frame.up), offset.dot(frame.forward));
             in_view.as_vec3().extend(0.0).into()
         })
         .collect();
