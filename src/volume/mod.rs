@@ -1,6 +1,7 @@
 //! Volumes: RGBA 3D textures, their files, recipes and mip pyramids.
 
 mod pyramid;
+pub mod recipe;
 
 /// An RGBA 3D texture in texture space (u, v, w).
 ///

@@ -1,0 +1,159 @@
+//! Noise that repeats exactly in u and v: the raw material of the soft recipes.
+//!
+//! Gradient noise: Ken Perlin, "Improving Noise", SIGGRAPH 2002. Cellular noise: Steven Worley, "A Cellular
+//! Texture Basis Function", SIGGRAPH 1996. Both deviate from their source in how a lattice point gets its
+//! random numbers: from an integer hash (the finaliser of MurmurHash3, Austin Appleby) of the wrapped
+//! lattice coordinates and a seed, not from a permutation table. So any period works, seeds are
+//! independent, and nothing is stored.
+//!
+//! A lattice has `period` cells a tile along x and y, where it wraps, and does not repeat along z.
+
+use glam::{IVec3, Vec3};
+
+/// 32 well-mixed bits for a lattice point.
+pub(super) fn hash(point: IVec3, seed: u32) -> u32 {
+    let mut bits = seed.wrapping_mul(0x9e37_79b1) ^ 0x85eb_ca6b;
+    for coordinate in point.to_array() {
+        bits = (bits ^ coordinate as u32).wrapping_mul(0xcc9e_2d51);
+        bits = bits.rotate_left(15).wrapping_mul(0x1b87_3593);
+    }
+    bits ^= bits >> 16;
+    bits = bits.wrapping_mul(0x85eb_ca6b);
+    bits ^= bits >> 13;
+    bits = bits.wrapping_mul(0xc2b2_ae35);
+    bits ^ (bits >> 16)
+}
+
+/// A number in 0..1 for item `index` of a list.
+pub(super) fn random(index: u32, seed: u32) -> f32 {
+    unit(hash(IVec3::new(index as i32, 0, 0), seed), 0, 24)
+}
+
+/// `count` bits of `bits` from bit `first` on, as a fraction of their range.
+fn unit(bits: u32, first: u32, count: u32) -> f32 {
+    ((bits >> first) & ((1 << count) - 1)) as f32 / (1u32 << count) as f32
+}
+
+fn wrap(cell: IVec3, period: [i32; 2]) -> IVec3 {
+    IVec3::new(cell.x.rem_euclid(period[0]), cell.y.rem_euclid(period[1]), cell.z)
+}
+
+/// Gradient noise at a point in lattice units, where a tile has `period` cells along x and y (each at
+/// least 1). Smooth (C2), 0 at lattice points, within +-1.04.
+pub(super) fn gradient(point: Vec3, period: [u32; 2], seed: u32) -> f32 {
+    // The 12 edges of a cube; four of them twice, so that four bits choose one without a bias in z.
+    const GRADIENTS: [[f32; 3]; 16] = [
+        [1., 1., 0.],
+        [-1., 1., 0.],
+        [1., -1., 0.],
+        [-1., -1., 0.],
+        [1., 0., 1.],
+        [-1., 0., 1.],
+        [1., 0., -1.],
+        [-1., 0., -1.],
+        [0., 1., 1.],
+        [0., -1., 1.],
+        [0., 1., -1.],
+        [0., -1., -1.],
+        [1., 1., 0.],
+        [-1., 1., 0.],
+        [0., -1., 1.],
+        [0., -1., -1.],
+    ];
+    let floor = point.floor();
+    let (cell, within) = (floor.as_ivec3(), point - floor);
+    let period = period.map(|cells| cells as i32);
+    let near = wrap(cell, period);
+    let far = wrap(cell + IVec3::new(1, 1, 0), period) + IVec3::Z;
+    let corner = |x: i32, y: i32, z: i32| {
+        let lattice = IVec3::new([near.x, far.x][x as usize], [near.y, far.y][y as usize], near.z + z);
+        let slope = Vec3::from(GRADIENTS[(hash(lattice, seed) & 15) as usize]);
+        slope.dot(within - IVec3::new(x, y, z).as_vec3())
+    };
+    let fade = within * within * within * (within * (within * 6. - 15.) + 10.);
+    let row = |y, z| mix(corner(0, y, z), corner(1, y, z), fade.x);
+    let plane = |z| mix(row(0, z), row(1, z), fade.y);
+    mix(plane(0), plane(1), fade.z)
+}
+
+fn mix(a: f32, b: f32, t: f32) -> f32 {
+    a + (b - a) * t
+}
+
+/// Octaves of noise, each with twice the cells and `gain` times the weight of the one before.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Octaves {
+    /// Cells a tile of the first octave.
+    pub cells: u32,
+    /// How many octaves.
+    pub count: u32,
+    /// Weight of an octave relative to the one before.
+    pub gain: f32,
+    /// Octaves with more cells a tile than this are left out: the grid could not hold them.
+    pub finest: u32,
+}
+
+impl Octaves {
+    /// The weighted sum of `noise(cells, seed)`, scaled so that the weights of all octaves, left-out ones
+    /// too, sum to one: a finer grid adds detail and changes nothing else.
+    pub fn sum(&self, seed: u32, noise: impl Fn(u32, u32) -> f32) -> f32 {
+        let (mut total, mut weights, mut weight) = (0., 0., 1.);
+        for octave in 0..self.count {
+            let cells = self.cells << octave;
+            if octave == 0 || cells <= self.finest {
+                total += weight * noise(cells, seed.wrapping_add(octave.wrapping_mul(0x632b_e5ab)));
+            }
+            weights += weight;
+            weight *= self.gain;
+        }
+        total / weights
+    }
+
+    /// Fractal gradient noise at a point in tile widths; within +-1.04, mostly within +-0.5.
+    pub fn gradient(&self, point: Vec3, seed: u32) -> f32 {
+        self.sum(seed, |cells, seed| gradient(point * cells as f32, [cells; 2], seed))
+    }
+
+    /// Fractal cellular noise at a point in tile widths: 1 at the features, falling to 0 between them.
+    pub fn billows(&self, point: Vec3, seed: u32) -> f32 {
+        self.sum(seed, |cells, seed| {
+            1. - nearest_feature(point * cells as f32, [cells; 2], seed).offset.length().min(1.)
+        })
+    }
+}
+
+/// What cellular noise knows of a point.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Feature {
+    /// From the point to its nearest feature, in lattice units.
+    pub offset: Vec3,
+    /// Random bits that belong to that feature.
+    pub id: u32,
+}
+
+/// The nearest of the features, one at a random place in each cell, to a point in lattice units.
+///
+/// Only the 27 cells around the point are searched. A feature within one cell's width is always found,
+/// which is nearly every point's nearest.
+pub(super) fn nearest_feature(point: Vec3, period: [u32; 2], seed: u32) -> Feature {
+    let floor = point.floor();
+    let (cell, within) = (floor.as_ivec3(), point - floor);
+    let period = period.map(|cells| cells as i32);
+    let mut nearest = Feature { offset: Vec3::INFINITY, id: 0 };
+    let mut squared = f32::INFINITY;
+    for z in -1..=1 {
+        for y in -1..=1 {
+            for x in -1..=1 {
+                let neighbour = IVec3::new(x, y, z);
+                let id = hash(wrap(cell + neighbour, period), seed);
+                let jitter = Vec3::new(unit(id, 0, 10), unit(id, 10, 11), unit(id, 21, 11));
+                let offset = neighbour.as_vec3() + jitter - within;
+                if offset.length_squared() < squared {
+                    squared = offset.length_squared();
+                    nearest = Feature { offset, id };
+                }
+            }
+        }
+    }
+    nearest
+}
