@@ -1,5 +1,8 @@
 //! The base mesh: triangles with positions, normals and texture coordinates.
 
+pub mod generate;
+pub mod weld;
+
 use glam::{DVec2, DVec3};
 
 /// A triangle mesh whose positions are welded: one id a place, whatever its texture seams.
@@ -17,4 +20,16 @@ pub struct Mesh {
     pub triangles: Vec<[u32; 3]>,
     /// Texture coordinates (u, v), one a triangle corner, so that seams cost nothing.
     pub uvs: Vec<[DVec2; 3]>,
+}
+
+impl Mesh {
+    /// Adds the positions and triangles of another mesh; positions that both have stay apart until they
+    /// are welded.
+    fn append(&mut self, other: Self) {
+        let offset = self.positions.len() as u32;
+        self.positions.extend(other.positions);
+        self.normals.extend(other.normals);
+        self.triangles.extend(other.triangles.iter().map(|ids| ids.map(|id| id + offset)));
+        self.uvs.extend(other.uvs);
+    }
 }

@@ -11,10 +11,20 @@
 //!
 //! Within a tetrahedron the four vertices are stored so that `det(v1-v0, v2-v0, v3-v0)` is positive
 //! in a shell that is not inverted; face `k` is the face opposite vertex `k`.
+//!
+//! The scheme is section 3 of Dufort, Leblanc, Poulin, "Interactive rendering of meso-structure surface
+//! details using semi-transparent 3D textures", VMV 2005. `topology` splits and connects, `extrude`
+//! places the outer vertices, `cell` computes the maps, `health` counts what is wrong.
+
+mod build;
+mod cell;
+mod extrude;
+mod health;
+mod topology;
 
 use std::sync::Arc;
 
-use glam::{DMat3, DVec2, DVec3};
+use glam::{DAffine3, DMat3, DVec2, DVec3, DVec4};
 
 /// In [`Topology::neighbours`]: no tetrahedron lies beyond that face.
 pub const EXTERIOR: u32 = u32::MAX;
@@ -33,9 +43,13 @@ pub struct Topology {
     /// Edges with three or more triangles, or with two that run the same way; the prism sides there
     /// are exterior faces.
     pub non_manifold_edges: u64,
+    /// Edges with one triangle; the prism sides there are exterior faces.
+    pub boundary_edges: u64,
 }
 
-/// The affine maps of one tetrahedron. All zero where its volume is zero.
+/// The affine maps of one tetrahedron.
+///
+/// All zero where the volume is exactly zero, or so near zero that the maps would not be finite.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Cell {
     /// World-space gradients of the four barycentric coordinates: `gradients[k]` points from face `k`
@@ -68,15 +82,17 @@ pub struct Health {
     pub tetrahedra: u64,
     /// Negative volume: the shell folds over there.
     pub inverted: u64,
-    /// Volume exactly zero (by exact arithmetic on the vertices): never drawn, still in the order.
+    /// Volume exactly zero (by exact arithmetic on the vertices), so that the [`Cell`] is zero: never
+    /// drawn, still in the order.
     pub zero_volume: u64,
     /// Shape quality below [`SLIVER_QUALITY`], but not of zero volume.
     pub slivers: u64,
     /// See [`Topology::non_manifold_edges`].
     pub non_manifold_edges: u64,
-    /// Edges with one triangle.
+    /// See [`Topology::boundary_edges`].
     pub boundary_edges: u64,
-    /// Vertices where the thickness exceeds the smallest radius of curvature on the concave side.
+    /// Vertices where the thickness exceeds the smallest radius of curvature on the concave side, estimated
+    /// along the edges.
     pub overlap_risk_vertices: u64,
 }
 
@@ -90,10 +106,83 @@ pub struct Shell {
     pub topology: Arc<Topology>,
     /// World space: base vertices, then outer vertices.
     pub vertices: Vec<DVec3>,
-    /// Texture-space (u, v, w) of the four vertices of each tetrahedron.
+    /// Texture-space (u, v, w) of the four vertices of each tetrahedron; w is exactly 0 or 1.
+    ///
+    /// u and v repeat, so the largest whole numbers that leave none of the four negative are taken off
+    /// (the same for all four, and for the whole prism): what is left keeps its precision in f32.
     pub texture: Vec<[DVec3; 4]>,
     /// One a tetrahedron.
     pub cells: Vec<Cell>,
     /// Counted when the shell was built.
     pub health: Health,
+}
+
+/// The corners of face `k`, counter-clockwise seen from outside a tetrahedron of positive volume.
+const FACES: [[usize; 3]; 4] = [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]];
+
+impl ShellOptions {
+    /// A shell of even thickness (world units) along the mesh's own normals, with its own UVs.
+    pub fn new(thickness: f64) -> Self {
+        Self {
+            thickness,
+            thickness_scale: Vec::new(),
+            smoothing_rounds: 0,
+            uv_scale: DVec2::ONE,
+            uv_offset: DVec2::ZERO,
+        }
+    }
+}
+
+impl Topology {
+    /// Shell vertex ids of face `k` of tetrahedron `t`, counter-clockwise seen from outside when the
+    /// tetrahedron's volume is positive.
+    pub fn face(&self, t: usize, k: usize) -> [u32; 3] {
+        FACES[k].map(|corner| self.tetrahedra[t][corner])
+    }
+}
+
+impl Shell {
+    /// World-space vertices of tetrahedron `t`.
+    pub fn vertices_of(&self, t: usize) -> [DVec3; 4] {
+        self.topology.tetrahedra[t].map(|id| self.vertices[id as usize])
+    }
+
+    /// See [`Topology::face`].
+    pub fn face(&self, t: usize, k: usize) -> [u32; 3] {
+        self.topology.face(t, k)
+    }
+
+    /// The paper's 3x4 matrix `M^{o->t}` of tetrahedron `t`: world space to texture space.
+    ///
+    /// Far from the world's origin its translation cancels against its linear part; where that matters,
+    /// use [`Cell::texture_from_world`] relative to a vertex. Where the [`Cell`] is zero, everything maps to
+    /// the first vertex's texture coordinates.
+    pub fn texture_from_world(&self, t: usize) -> DAffine3 {
+        let linear = self.cells[t].texture_from_world;
+        let [origin, ..] = self.vertices_of(t);
+        DAffine3 { matrix3: linear, translation: self.texture[t][0] - linear * origin }
+    }
+
+    /// The plane of each face of tetrahedron `t` as `(n, d)`: `n` of unit length, in world space, and
+    /// `n . x + d >= 0` inside. All zero where the [`Cell`] is zero.
+    ///
+    /// The two tetrahedra at a shared face get the same plane, bit for bit, up to its sign.
+    pub fn planes(&self, t: usize) -> [DVec4; 4] {
+        std::array::from_fn(|k| {
+            let (normal, origin) = cell::area_vector(&self.vertices, self.face(t, k));
+            let inward = self.cells[t].gradients[k].dot(normal);
+            if inward == 0.0 {
+                return DVec4::ZERO;
+            }
+            let normal = normal.normalize() * inward.signum();
+            normal.extend(-normal.dot(origin))
+        })
+    }
+
+    /// Barycentric coordinates of a world-space point in tetrahedron `t`: none is negative inside. All zero
+    /// where the [`Cell`] is zero.
+    pub fn barycentric(&self, t: usize, point: DVec3) -> [f64; 4] {
+        let vertices = self.vertices_of(t);
+        std::array::from_fn(|k| self.cells[t].gradients[k].dot(point - vertices[FACES[k][0]]))
+    }
 }
