@@ -11,8 +11,9 @@ use serde::Deserialize;
 use toml::Spanned;
 
 use super::camera::DEFAULT_FOV_DEGREES;
-use super::number::{Exactly, FieldOfView, Finite, NotNegative, Pixels, Positive, Rounds, Samples};
+use super::number::{Exactly, FieldOfView, Finite, NotNegative, PictureSize, Pixels, Positive, Rounds, Samples};
 use crate::mesh::generate::Generator;
+use crate::mesh::projection::Projection;
 
 /// A whole scene file.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
@@ -40,6 +41,10 @@ pub struct SceneFile {
 pub struct MeshSection {
     /// A generated mesh, with the keys of its generator.
     pub generator: Option<Generator>,
+    /// A mesh file, relative to the scene file.
+    pub file: Option<PathBuf>,
+    /// How texture coordinates are made, in place of those of the file.
+    pub projection: Option<Projection>,
 }
 
 /// `[shell]`.
@@ -94,7 +99,7 @@ pub struct CameraSection {
 #[serde(deny_unknown_fields, default)]
 pub struct ImageSection {
     /// Width and height.
-    pub size: Exactly<2, Pixels>,
+    pub size: PictureSize,
     /// Linear RGB; a transparent picture without it.
     pub background: Option<Exactly<3, NotNegative>>,
 }
@@ -123,7 +128,7 @@ pub enum Plan {
 
 impl Default for ImageSection {
     fn default() -> Self {
-        Self { size: Exactly([Pixels(512); 2]), background: None }
+        Self { size: PictureSize([Pixels(512); 2]), background: None }
     }
 }
 

@@ -12,8 +12,9 @@ use super::number::{Exactly, Finite};
 use super::text::Text;
 use super::{Camera, March, Medium, Scene, View};
 use crate::frame::{Stage, Stopwatch};
-use crate::mesh::Mesh;
 use crate::mesh::generate::Generator;
+use crate::mesh::projection::Projection;
+use crate::mesh::{Mesh, obj};
 use crate::progress::{Progress, Silent};
 use crate::shell::{Shell, ShellOptions};
 use crate::volume::{Pyramid, Volume, recipe};
@@ -70,7 +71,7 @@ fn build(text: &Text, base_dir: &Path, progress: &dyn Progress) -> Result<Loaded
     let volume = VolumeSource::of(text, &file.volume)?;
 
     progress.stage("loading the mesh");
-    let mesh = mesh.load()?;
+    let mesh = mesh.load(base_dir)?;
     stopwatch.lap("load.mesh");
 
     progress.stage("building the shell");
@@ -117,25 +118,30 @@ fn build(text: &Text, base_dir: &Path, progress: &dyn Progress) -> Result<Loaded
 /// Where the mesh comes from.
 enum MeshSource<'a> {
     Generator(&'a Generator),
+    File(&'a Path, Option<&'a Projection>),
 }
 
 impl<'a> MeshSource<'a> {
     fn of(text: &Text, section: &'a Spanned<MeshSection>) -> Result<Self> {
         match section.get_ref() {
-            MeshSection { generator: Some(generator) } => {
+            MeshSection { generator: Some(generator), file: None, projection: None } => {
                 generator.check().map_err(|bad| {
                     let span = text.span_of("mesh", bad.key).unwrap_or(section.span());
                     text.error(span, format!("`{}` {}", bad.key, bad.message))
                 })?;
                 Ok(Self::Generator(generator))
             }
+            MeshSection { generator: None, file: Some(file), projection } => {
+                Ok(Self::File(file, projection.as_ref()))
+            }
             _ => Err(text.error(section.span(), "[mesh] needs either `generator` with its keys or `file`")),
         }
     }
 
-    fn load(self) -> Result<Mesh> {
+    fn load(self, base_dir: &Path) -> Result<Mesh> {
         match self {
             Self::Generator(generator) => generator.build(),
+            Self::File(file, projection) => obj::load(base_dir.join(file), projection),
         }
     }
 }

@@ -108,3 +108,17 @@ impl<const N: usize, T> TryFrom<Vec<T>> for Exactly<N, T> {
             .map_err(|list: Vec<T>| format!("invalid length {}, expected a list of {N}", list.len()))
     }
 }
+
+/// Width and height of a picture that fits into memory: at most 2^28 pixels.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(try_from = "Exactly<2, Pixels>")]
+pub struct PictureSize(pub [Pixels; 2]);
+
+impl TryFrom<Exactly<2, Pixels>> for PictureSize {
+    type Error = &'static str;
+
+    fn try_from(Exactly(size): Exactly<2, Pixels>) -> Result<Self, Self::Error> {
+        let pixels: u64 = size.iter().map(|side| u64::from(side.0)).product();
+        if pixels <= 1 << 28 { Ok(Self(size)) } else { Err("too large a picture, expected at most 2^28 pixels") }
+    }
+}
