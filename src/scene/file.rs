@@ -11,9 +11,10 @@ use serde::Deserialize;
 use toml::Spanned;
 
 use super::camera::DEFAULT_FOV_DEGREES;
-use super::number::{Exactly, FieldOfView, Finite, NotNegative, PictureSize, Pixels, Positive, Rounds, Samples};
+use super::number::{Exactly, FieldOfView, Finite, Fraction, NotNegative, PictureSize, Pixels, Positive, Rounds, Samples};
 use crate::mesh::generate::Generator;
 use crate::mesh::projection::Projection;
+use crate::volume::TransferFunction;
 
 /// A whole scene file.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
@@ -64,12 +65,18 @@ pub struct ShellSection {
     pub uv_offset: Exactly<2, Finite>,
 }
 
-/// `[volume]`: a recipe, a volume file, or a stack of images.
+/// `[volume]`: a recipe or a file.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct VolumeSection {
     /// A recipe file, relative to the scene file.
     pub recipe: Option<PathBuf>,
+    /// A volume file, a folder of images or a pattern of them, relative to the scene file.
+    pub file: Option<PathBuf>,
+    /// How the scalars of a file become colour and opacity.
+    pub transfer: Option<TransferFunction>,
+    /// The opacity of every texel of a file that has red, green and blue alone.
+    pub alpha: Option<Fraction>,
     /// World units; by default one level-0 texel along w.
     pub opacity_distance: Option<Positive>,
     /// In pixels.

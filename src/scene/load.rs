@@ -17,7 +17,7 @@ use crate::mesh::projection::Projection;
 use crate::mesh::{Mesh, obj};
 use crate::progress::{Progress, Silent};
 use crate::shell::{Shell, ShellOptions};
-use crate::volume::{Pyramid, Volume, recipe};
+use crate::volume::{self, Interpretation, Pyramid, Volume, recipe};
 use crate::{Error, Result};
 
 /// No scene file that a person wrote is longer, in bytes.
@@ -149,21 +149,36 @@ impl<'a> MeshSource<'a> {
 /// Where the volume comes from.
 enum VolumeSource<'a> {
     Recipe(&'a Path),
+    File(&'a Path, Interpretation),
 }
 
 impl<'a> VolumeSource<'a> {
     fn of(text: &Text, section: &'a Spanned<VolumeSection>) -> Result<Self> {
         match section.get_ref() {
-            VolumeSection { recipe: Some(path), .. } => Ok(Self::Recipe(path)),
-            _ => {
-                Err(text.error(section.span(), "[volume] needs exactly one of `recipe`, `file` and `stack`"))
+            VolumeSection { recipe: Some(path), file: None, transfer: None, alpha: None, .. } => {
+                Ok(Self::Recipe(path))
             }
+            VolumeSection { recipe: None, file: Some(path), transfer, alpha, .. } => {
+                let interpretation = Interpretation {
+                    alpha_mode: None,
+                    constant_alpha: alpha.map(|alpha| alpha.0 as f32),
+                    transfer: transfer.clone(),
+                };
+                Ok(Self::File(path, interpretation))
+            }
+            _ => Err(text.error(
+                section.span(),
+                "[volume] needs either `recipe`, or `file` with what it may need of `transfer` and `alpha`",
+            )),
         }
     }
 
     fn load(self, base_dir: &Path) -> Result<Volume> {
         match self {
             Self::Recipe(path) => recipe::load(base_dir.join(path))?.build(),
+            Self::File(path, interpretation) => {
+                Volume::from_raw(volume::read(&base_dir.join(path))?, &interpretation)
+            }
         }
     }
 }

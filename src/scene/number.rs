@@ -77,6 +77,10 @@ number! {
     NotNegative = "a finite number of at least 0", |value| value >= 0.0
 }
 number! {
+    /// From 0 to 1, both included.
+    Fraction = "a number from 0 to 1", |value| (0.0..=1.0).contains(&value)
+}
+number! {
     /// An angle in degrees, above 0 and below 180.
     FieldOfView = "an angle in degrees between 0 and 180, both excluded", |value| value > 0.0 && value < 180.0
 }
