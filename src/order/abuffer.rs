@@ -1,0 +1,356 @@
+//! Relations across gaps: an A-buffer of the shell's boundary faces at the image's pixel centres.
+//!
+//! Along a pixel's ray the tetrahedra of a connected run are related face by face; between two runs the
+//! tetrahedron that the ray leaves last is related to the one that it enters next.
+//!
+//! ```text
+//!   eye ----[ A | B ]-------[ C | D | E ]------>      boundary faces: in A, out B, in C, out E
+//!            A<B by a face   C<D<E by faces            the A-buffer adds B<C
+//! ```
+//!
+//! Against section 4.1 of Dufort, Leblanc, Poulin 2005:
+//! - faces are sampled in f64 by edge functions of the homogeneous triangle (Olano, Greer 1997), linear in
+//!   pixel coordinates whether or not vertices lie behind the eye: nothing is clipped, and only points
+//!   in front of the eye are met (the near plane plays no part);
+//! - runs may overlap where the shell overlaps itself: a tetrahedron is related to every entry
+//!   until a run that began after it must have ended;
+//! - a ray through an edge or vertex is taken as passing just beside it, by an infinitesimal step to the
+//!   right and a yet smaller one down: shared edges are crossed exactly once, and faces that meet the ray at one
+//!   depth, within rounding, are sorted by their depth just beside it.
+//!
+//! Inverse depth is used for depth: it is linear in pixel coordinates over a plane.
+
+use std::ops::Range;
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+use super::relations::BoundaryFace;
+use crate::scene::View;
+
+/// Rows of pixels that are worked on together: few enough that their fragments stay in the cache.
+const BAND: usize = 16;
+
+/// Inverse depths that differ by less than this, relatively, are a tie. Their own error is a few units of
+/// rounding (1e-16) over the cosine of the angle between ray and normal; this allows for cosines down to
+/// about 1e-4.
+const TIE: f64 = 1e-11;
+
+/// Pixels by which bounds are widened before pixels are tested one by one: above the rounding of a
+/// projected coordinate (1e-16 of an image at most 1e6 wide), and small enough to cost nothing.
+const MARGIN: f64 = 1e-6;
+
+/// End of a list of fragments.
+const NONE: u32 = u32::MAX;
+
+/// A linear function of pixel coordinates that are measured from the image's middle.
+#[derive(Debug, Clone, Copy)]
+struct Line {
+    x: f64,
+    y: f64,
+    constant: f64,
+}
+
+impl Line {
+    /// The inner product of `normal` with the pixel's ray of unit depth, times `scale`.
+    fn new(normal: DVec3, pixel: f64, scale: f64) -> Self {
+        Self { x: normal.x * pixel * scale, y: normal.y * pixel * scale, constant: normal.z * scale }
+    }
+
+    /// Whether pixels where the function is zero count as positive: its sign just beside them.
+    fn owns_zero(&self) -> bool {
+        self.x > 0.0 || (self.x == 0.0 && self.y > 0.0)
+    }
+}
+
+/// The image plane: pixels are square, `pixel` wide at depth 1.
+#[derive(Debug, Clone, Copy)]
+struct Raster {
+    width: usize,
+    height: usize,
+    pixel: f64,
+}
+
+impl Raster {
+    /// The middle of pixel `(x, y)` from the image's middle, along one axis of `size` pixels. Exact.
+    fn centre(index: usize, size: usize) -> f64 {
+        index as f64 + 0.5 - 0.5 * size as f64
+    }
+
+    /// The indices, of `size` along one axis, whose centres lie in `low..=high`, with a margin.
+    fn indices(low: f64, high: f64, size: usize) -> Range<usize> {
+        let first = 0.5 * size as f64 - 0.5;
+        let begin = (low + first - MARGIN).ceil().clamp(0.0, size as f64);
+        let end = ((high + first + MARGIN).floor() + 1.0).clamp(begin, size as f64);
+        begin as usize..end as usize
+    }
+}
+
+/// A boundary face as the image sees it.
+#[derive(Debug, Clone)]
+struct Footprint {
+    /// Positive inside.
+    edges: [Line; 3],
+    /// Inverse depth, in front of the eye inside.
+    inverse_depth: Line,
+    columns: Range<usize>,
+    rows: Range<usize>,
+    cell: u32,
+    leaves: bool,
+}
+
+/// The range of `axis / z`, in pixels, over those points of a triangle that have positive z;
+/// empty (low > high) where there are none. Unbounded where an edge passes beside the eye.
+fn projected_range(corners: &[DVec3; 3], axis: usize, pixel: f64) -> (f64, f64) {
+    let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+    for front in corners.iter().filter(|corner| corner.z > 0.0) {
+        let projected = front[axis] / (front.z * pixel);
+        low = low.min(projected);
+        high = high.max(projected);
+        for behind in corners.iter().filter(|corner| corner.z <= 0.0) {
+            // Where the edge comes to depth 0 it projects to infinity, on the side where it is then.
+            let (a, b) = (front[axis] * -behind.z, behind[axis] * front.z);
+            let rounding = 4.0 * f64::EPSILON * (a.abs() + b.abs());
+            if a + b >= -rounding {
+                high = f64::INFINITY;
+            }
+            if a + b <= rounding {
+                low = f64::NEG_INFINITY;
+            }
+        }
+    }
+    (low, high)
+}
+
+impl Footprint {
+    /// `None` where the face meets no pixel centre for sure.
+    /// `vertices` are relative to the eye: right, down, into the picture.
+    fn new(face: &BoundaryFace, vertices: &[DVec3], raster: Raster) -> Option<Self> {
+        let [p, q, r] = face.vertices.map(|v| vertices[v as usize]);
+        let corners = [p, q, r];
+        let pixel = raster.pixel;
+        let (left, right) = projected_range(&corners, 0, pixel);
+        let (top, bottom) = projected_range(&corners, 1, pixel);
+        let columns = Raster::indices(left, right, raster.width);
+        let rows = Raster::indices(top, bottom, raster.height);
+        if columns.is_empty() || rows.is_empty() {
+            return None;
+        }
+        // Differences first: the plane's tilt then has the error of the triangle's shape, not of its distance.
+        let normal = (q - p).cross(r - p);
+        let eye_side = f64::from(face.eye_side);
+        let distance = normal.dot(p);
+        if distance * eye_side <= 0.0 || !distance.is_normal() {
+            return None; // seen from the side, thinner than rounding
+        }
+        // An edge function has the same bits, up to its sign, for every triangle on that edge.
+        let edges =
+            [q.cross(r), r.cross(p), p.cross(q)].map(|normal| Line::new(normal, pixel, eye_side));
+        let inverse_depth = Line::new(normal, pixel, distance.recip());
+        Some(Self { edges, inverse_depth, columns, rows, cell: face.cell, leaves: face.leaves })
+    }
+
+    /// Calls `visit(x, inverse depth)` for the pixels of row `y` that are covered.
+    fn cover_row(&self, y: usize, raster: Raster, mut visit: impl FnMut(usize, f64)) {
+        let centre_y = Raster::centre(y, raster.height);
+        let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);
+        let at_row = self.edges.map(|edge| edge.y * centre_y + edge.constant);
+        for (edge, at_row) in self.edges.iter().zip(at_row) {
+            let crossing = -at_row / edge.x;
+            if edge.x > 0.0 {
+                low = low.max(crossing);
+            } else if edge.x < 0.0 {
+                high = high.min(crossing);
+            }
+        }
+        let span = Raster::indices(low, high, raster.width);
+        let columns = span.start.max(self.columns.start)..span.end.min(self.columns.end);
+        let depth_at_row = self.inverse_depth.y * centre_y + self.inverse_depth.constant;
+        let owns_zero = self.edges.map(|edge| edge.owns_zero());
+        for x in columns {
+            let centre_x = Raster::centre(x, raster.width);
+            let covered = (0..3).all(|i| {
+                let value = self.edges[i].x * centre_x + at_row[i];
+                value > 0.0 || (value == 0.0 && owns_zero[i])
+            });
+            if covered {
+                visit(x, self.inverse_depth.x * centre_x + depth_at_row);
+            }
+        }
+    }
+}
+
+/// Where a ray meets a face.
+#[derive(Debug, Clone, Copy)]
+struct Fragment {
+    inverse_depth: f64,
+    footprint: u32,
+    /// The next fragment of the pixel, or [`NONE`].
+    next: u32,
+}
+
+/// Working memory of one thread, kept between bands.
+struct Scratch {
+    /// First fragment of each pixel of the band.
+    heads: Vec<u32>,
+    fragments: Vec<Fragment>,
+    /// The fragments of one pixel.
+    list: Vec<Fragment>,
+    /// Tetrahedra that the ray left, each with the number of further leaves until it is forgotten.
+    left: Vec<(u32, usize)>,
+    /// For each tetrahedron the last one that was found in front of it: neighbouring pixels say the same.
+    last_front: Vec<u32>,
+}
+
+/// Relates tetrahedra across gaps: lists of `[front, back]`, with duplicates.
+///
+/// `vertices` are in world space, `boundary` is [`Relations::boundary`](super::relations::Relations::boundary)
+/// for the eye of `view`, and `tetrahedra` is their number. The set of pairs does not depend on threads.
+pub fn relate(
+    vertices: &[DVec3],
+    tetrahedra: usize,
+    boundary: &[BoundaryFace],
+    view: &View,
+) -> Vec<Vec<[u32; 2]>> {
+    let raster = Raster {
+        width: view.width as usize,
+        height: view.height as usize,
+        pixel: view.pixel_at_unit_depth(),
+    };
+    let frame = view.camera.frame();
+    let from_eye = |&vertex: &DVec3| {
+        let offset = vertex - view.camera.eye;
+        DVec3::new(frame.right.dot(offset), -frame.up.dot(offset), frame.forward.dot(offset))
+    };
+    let vertices: Vec<DVec3> = vertices.par_iter().with_min_len(1024).map(from_eye).collect();
+    let footprints: Vec<Footprint> = boundary
+        .par_iter()
+        .with_min_len(256)
+        .filter_map(|face| Footprint::new(face, &vertices, raster))
+        .collect();
+
+    let scratch = || Scratch {
+        heads: vec![NONE; raster.width * BAND],
+        fragments: Vec::new(),
+        list: Vec::new(),
+        left: Vec::new(),
+        last_front: vec![NONE; tetrahedra],
+    };
+    let bands = footprints_of_bands(&footprints, raster);
+    bands
+        .par_iter()
+        .enumerate()
+        .map_init(scratch, |scratch, (band, members)| {
+            scratch.collect_fragments(band, members, &footprints, raster);
+            scratch.relate_pixels(&footprints)
+        })
+        .collect()
+}
+
+/// For each band of rows, the footprints that reach into it.
+fn footprints_of_bands(footprints: &[Footprint], raster: Raster) -> Vec<Vec<u32>> {
+    let mut bands = vec![Vec::new(); raster.height.div_ceil(BAND)];
+    for (id, footprint) in (0u32..).zip(footprints) {
+        for band in &mut bands[footprint.rows.start / BAND..=(footprint.rows.end - 1) / BAND] {
+            band.push(id);
+        }
+    }
+    bands
+}
+
+impl Scratch {
+    /// Fills the lists of the pixels of one band.
+    fn collect_fragments(
+        &mut self,
+        band: usize,
+        members: &[u32],
+        footprints: &[Footprint],
+        raster: Raster,
+    ) {
+        self.heads.fill(NONE);
+        self.fragments.clear();
+        let first_row = band * BAND;
+        for &id in members {
+            let footprint = &footprints[id as usize];
+            for y in footprint.rows.start.max(first_row)..footprint.rows.end.min(first_row + BAND) {
+                let heads = &mut self.heads[(y - first_row) * raster.width..][..raster.width];
+                footprint.cover_row(y, raster, |x, inverse_depth| {
+                    let next = std::mem::replace(&mut heads[x], self.fragments.len() as u32);
+                    self.fragments.push(Fragment { inverse_depth, footprint: id, next });
+                });
+            }
+        }
+    }
+
+    /// Sorts the lists and follows each ray.
+    fn relate_pixels(&mut self, footprints: &[Footprint]) -> Vec<[u32; 2]> {
+        let mut pairs = Vec::new();
+        for pixel in 0..self.heads.len() {
+            self.list.clear();
+            let mut next = self.heads[pixel];
+            while next != NONE {
+                let fragment = self.fragments[next as usize];
+                self.list.push(fragment);
+                next = fragment.next;
+            }
+            if self.list.len() < 2 {
+                continue;
+            }
+            sort_front_to_back(&mut self.list, footprints);
+            self.follow_ray(footprints, &mut pairs);
+        }
+        pairs
+    }
+
+    /// Relates what one ray leaves to what it enters next; `self.list` is sorted.
+    fn follow_ray(&mut self, footprints: &[Footprint], pairs: &mut Vec<[u32; 2]>) {
+        let face = |fragment: &Fragment| &footprints[fragment.footprint as usize];
+        let leaves = self.list.iter().filter(|fragment| face(fragment).leaves).count();
+        // Every run ends in front of the eye; those that do not begin there hold the eye.
+        let mut open_runs = (2 * leaves).saturating_sub(self.list.len());
+        self.left.clear();
+        for fragment in &self.list {
+            let Footprint { cell, leaves, .. } = *face(fragment);
+            if leaves {
+                open_runs = open_runs.saturating_sub(1);
+                self.left.retain_mut(|(_, leaves_to_go)| {
+                    *leaves_to_go -= 1;
+                    *leaves_to_go > 0
+                });
+                // Of the runs that are open now, each may leave once; one more must have begun later,
+                // and whatever follows it follows this one.
+                self.left.push((cell, open_runs + 1));
+            } else {
+                open_runs += 1;
+                for &(front, _) in &self.left {
+                    if front != cell && self.last_front[cell as usize] != front {
+                        self.last_front[cell as usize] = front;
+                        pairs.push([front, cell]);
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Sorts the fragments of a pixel by depth; those of equal depth by their depth just beside the pixel's
+/// centre, then leaves before entries (faces in the same place), then by id.
+fn sort_front_to_back(list: &mut [Fragment], footprints: &[Footprint]) {
+    list.sort_unstable_by(|a, b| {
+        b.inverse_depth.total_cmp(&a.inverse_depth).then(a.footprint.cmp(&b.footprint))
+    });
+    let tied = |a: &Fragment, b: &Fragment| b.inverse_depth >= a.inverse_depth * (1.0 - TIE);
+    for group in list.chunk_by_mut(tied).filter(|group| group.len() > 1) {
+        group.sort_unstable_by(|a, b| {
+            let (id_a, id_b) = (a.footprint, b.footprint);
+            let (a, b) = (&footprints[id_a as usize], &footprints[id_b as usize]);
+            let (slope_a, slope_b) = (&a.inverse_depth, &b.inverse_depth);
+            slope_b
+                .x
+                .total_cmp(&slope_a.x)
+                .then(slope_b.y.total_cmp(&slope_a.y))
+                .then(b.leaves.cmp(&a.leaves))
+                .then(id_a.cmp(&id_b))
+        });
+    }
+}

@@ -1,0 +1,166 @@
+//! Relations between tetrahedra that share a face: the one on the eye's side of the face is in front.
+//!
+//! Every sign is that of an exact adaptive predicate (Shewchuk 1997) on the world-space vertices, with
+//! the vertices of a face in one canonical order (ascending ids): both tetrahedra read the same sign, so
+//! rounding can make no false cycle. Which side of a face a tetrahedron lies on is the exact orientation of
+//! its fourth vertex, not its place in the mesh, so an inverted tetrahedron is related as it lies.
+//!
+//! | the two tetrahedra of a face | relation | the face in the A-buffer |
+//! |---|---|---|
+//! | on opposite sides of it | the eye's side is in front | no |
+//! | one has no volume | the other's side decides | for the one with volume |
+//! | both on one side (a fold) | none: they overlap, a ray leaves or enters both | for both |
+//! | neither has volume | none | no |
+//! | the eye lies in the face's plane | none: no ray crosses it | no |
+//!
+//! A tetrahedron without volume is met by a ray in one point, yet the order of its neighbours may run
+//! through it. Their faces towards it are in the A-buffer too, so that nothing is lost where several such
+//! tetrahedra lie behind one another.
+
+use glam::DVec3;
+use rayon::prelude::*;
+use robust::{Coord3D, orient3d};
+
+use crate::shell::{EXTERIOR, Topology};
+
+/// One face of the shell with the tetrahedra on it.
+#[derive(Debug, Clone, Copy)]
+struct Face {
+    /// Ascending vertex ids: the canonical order.
+    vertices: [u32; 3],
+    /// The second is [`EXTERIOR`] where there is none.
+    cells: [u32; 2],
+    /// The face's number 0..4 in each of `cells`.
+    local: [u8; 2],
+    /// Factor from a cell's orientation to the side of this face on which the cell lies.
+    parity: [i8; 2],
+}
+
+/// The faces of a topology; kept while vertices move.
+#[derive(Debug, Clone)]
+pub struct FaceTable {
+    faces: Vec<Face>,
+}
+
+/// A face of one tetrahedron beyond which no other is known to follow: the outside, a fold, or a
+/// tetrahedron without volume.
+#[derive(Debug, Clone, Copy)]
+pub struct BoundaryFace {
+    /// Ascending vertex ids.
+    pub vertices: [u32; 3],
+    /// The tetrahedron.
+    pub cell: u32,
+    /// A ray from the eye leaves the tetrahedron here; else it enters.
+    pub leaves: bool,
+    /// +1 or -1: the sign of `p . (q x r)` for the vertices relative to the eye.
+    pub eye_side: i8,
+}
+
+/// What the faces tell about one view.
+#[derive(Debug, Clone)]
+pub struct Relations {
+    /// `[front, back]` tetrahedra.
+    pub pairs: Vec<[u32; 2]>,
+    /// One a tetrahedron: bit `k` is set where the eye lies strictly on the inner side of face `k`,
+    /// so that a ray leaves through it. 0 for a tetrahedron without volume.
+    pub exit_faces: Vec<u8>,
+    /// The faces that the A-buffer needs.
+    pub boundary: Vec<BoundaryFace>,
+}
+
+/// -1, 0 or +1: the exact sign of `a . (b x c)`, all relative to `d`.
+fn orientation(a: DVec3, b: DVec3, c: DVec3, d: DVec3) -> i8 {
+    let coord = |v: DVec3| Coord3D { x: v.x, y: v.y, z: v.z };
+    let determinant = orient3d(coord(a), coord(b), coord(c), coord(d));
+    i8::from(determinant > 0.0) - i8::from(determinant < 0.0)
+}
+
+/// The vertices of face `k` of a tetrahedron in canonical order, and the parity (+1, -1) of the
+/// permutation that takes the tetrahedron's vertices to them and vertex `k`.
+fn canonical_face(tetrahedron: [u32; 4], k: usize) -> ([u32; 3], i8) {
+    let mut order = [(k + 1) % 4, (k + 2) % 4, (k + 3) % 4];
+    order.sort_unstable_by_key(|&i| tetrahedron[i]);
+    let permutation = [order[0], order[1], order[2], k];
+    let inversions = (0..4).flat_map(|j| (0..j).map(move |i| (i, j)));
+    let inversions = inversions.filter(|&(i, j)| permutation[i] > permutation[j]).count();
+    (order.map(|i| tetrahedron[i]), if inversions % 2 == 0 { 1 } else { -1 })
+}
+
+impl FaceTable {
+    /// Lists every face once.
+    pub fn new(topology: &Topology) -> Self {
+        let mut faces = Vec::with_capacity(topology.tetrahedra.len() * 5 / 2);
+        for (cell, (&tetrahedron, neighbours)) in
+            (0u32..).zip(topology.tetrahedra.iter().zip(&topology.neighbours))
+        {
+            for k in 0..4 {
+                let other = neighbours[k];
+                if other < cell {
+                    continue; // listed from the other side
+                }
+                let (vertices, parity) = canonical_face(tetrahedron, k);
+                let mut face =
+                    Face { vertices, cells: [cell, other], local: [k as u8, 0], parity: [parity, 0] };
+                if other != EXTERIOR {
+                    let opposite = topology.tetrahedra[other as usize];
+                    let (k, (_, parity)) = (0..4)
+                        .map(|k| (k, canonical_face(opposite, k)))
+                        .find(|(_, (shared, _))| *shared == vertices)
+                        .expect("neighbours share the face between them");
+                    face.local[1] = k as u8;
+                    face.parity[1] = parity;
+                }
+                faces.push(face);
+            }
+        }
+        Self { faces }
+    }
+
+    /// Relates the tetrahedra of `topology` (the one of [`FaceTable::new`]) as seen from `eye`.
+    /// `vertices` and `eye` are in world space.
+    pub fn relate(&self, topology: &Topology, vertices: &[DVec3], eye: DVec3) -> Relations {
+        let at = |id: u32| vertices[id as usize];
+        let orientations: Vec<i8> = topology
+            .tetrahedra
+            .par_iter()
+            .with_min_len(1024)
+            .map(|t| orientation(at(t[0]), at(t[1]), at(t[2]), at(t[3])))
+            .collect();
+        let eye_sides: Vec<i8> = self
+            .faces
+            .par_iter()
+            .with_min_len(1024)
+            .map(|f| orientation(at(f.vertices[0]), at(f.vertices[1]), at(f.vertices[2]), eye))
+            .collect();
+
+        let mut pairs = Vec::with_capacity(self.faces.len());
+        let mut exit_faces = vec![0u8; topology.tetrahedra.len()];
+        let mut boundary = Vec::new();
+        for (face, &eye_side) in self.faces.iter().zip(&eye_sides) {
+            if eye_side == 0 {
+                continue;
+            }
+            let inner_side = |i: usize| match face.cells[i] {
+                EXTERIOR => 0,
+                cell => orientations[cell as usize] * face.parity[i],
+            };
+            let sides = [inner_side(0), inner_side(1)];
+            for (i, cell) in face.cells.into_iter().enumerate() {
+                if sides[i] == 0 {
+                    continue;
+                }
+                let leaves = sides[i] == eye_side;
+                exit_faces[cell as usize] |= u8::from(leaves) << face.local[i];
+                if sides[1 - i] != -sides[i] {
+                    boundary.push(BoundaryFace { vertices: face.vertices, cell, leaves, eye_side });
+                }
+            }
+            let [first, second] = face.cells;
+            if second != EXTERIOR && sides[0] != sides[1] {
+                let first_in_front = sides[0] == eye_side || sides[1] == -eye_side;
+                pairs.push(if first_in_front { [first, second] } else { [second, first] });
+            }
+        }
+        Relations { pairs, exit_faces, boundary }
+    }
+}
