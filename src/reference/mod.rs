@@ -1,1 +1,189 @@
-//! The f64 reference integrator.
+//! The f64 reference integrator: what every other method is measured against.
+//!
+//! It evaluates the integral of the medium (DESIGN sections 1 and 5) along each pixel's ray on the CPU,
+//! in f64, to [`TOLERANCE`], and was derived from that integral, from no shader:
+//!
+//! ```text
+//!   C = integral of T(s) sigma(s) c(s) ds      T(s) = exp(-integral of sigma from the near plane to s)
+//!   sigma = -ln(1 - alpha) / opacity_distance  c = P / alpha      (P, alpha): the texture, premultiplied
+//! ```
+//!
+//! - [`crossing`]: which tetrahedra lie on a ray, by a bounding volume hierarchy and clipping;
+//! - [`texture`]: the texture along the ray, a cubic in each cell of texel centres;
+//! - [`quadrature`]: the nested rule of a panel;
+//! - [`integrate`]: the coupled integral along the ray, with its error control.
+//!
+//! Rays are measured by *depth* `z` along the camera's forward axis. Where tetrahedra overlap, in a shell that
+//! intersects itself, their media add. Where all eight corners of a texel cell have alpha 1 is a wall: what
+//! reaches it sees its colour there, and nothing behind it.
+
+mod crossing;
+mod integrate;
+mod quadrature;
+mod texture;
+
+use std::sync::atomic::{AtomicU32, Ordering};
+
+use glam::{DVec2, DVec3};
+use rayon::prelude::*;
+
+use crate::Result;
+use crate::frame::{Frame, Image, Report, Stopwatch};
+use crate::progress::{Interrupt, Progress};
+use crate::scene::{Scene, View};
+
+use crossing::Crossings;
+use integrate::RayIntegral;
+use quadrature::Rule;
+
+/// Largest absolute error of premultiplied red, green, blue and alpha, where colour is at most 1.
+pub const TOLERANCE: f64 = 1e-9;
+
+/// What one ray sees.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sample {
+    /// Linear premultiplied red, green, blue and alpha.
+    pub rgba: [f64; 4],
+    /// Mean distance from the eye, in world units, at which light was stopped,
+    /// `integral of T sigma s ds / alpha`; infinite where alpha is 0.
+    pub depth: f64,
+}
+
+/// A scene prepared for rays from one eye.
+pub struct Reference<'a> {
+    scene: &'a Scene,
+    view: View,
+    tolerance: f64,
+    /// The largest colour (premultiplied by nothing) of any texel, at least 1.
+    brightness: f64,
+    rule: Rule,
+    crossings: Crossings,
+}
+
+#[derive(Debug, Clone, Copy, Default)]
+struct Counts {
+    rays: u64,
+    segments: u64,
+    panels: u64,
+}
+
+impl Counts {
+    fn add(self, other: Self) -> Self {
+        Self {
+            rays: self.rays + other.rays,
+            segments: self.segments + other.segments,
+            panels: self.panels + other.panels,
+        }
+    }
+}
+
+impl<'a> Reference<'a> {
+    /// Prepares the scene for the eye of `view`; `scene.view` is not read.
+    pub fn new(scene: &'a Scene, view: &View) -> Self {
+        Self {
+            scene,
+            view: *view,
+            tolerance: TOLERANCE,
+            brightness: brightness(scene),
+            rule: Rule::new(),
+            crossings: Crossings::new(&scene.shell, view),
+        }
+    }
+
+    /// The same with another largest error than [`TOLERANCE`].
+    #[must_use]
+    pub fn with_tolerance(self, tolerance: f64) -> Self {
+        Self { tolerance, ..self }
+    }
+
+    /// The ray through the centre of pixel `(x, y)`.
+    pub fn pixel(&self, x: u32, y: u32) -> Sample {
+        self.integrate_ray(DVec2::new(f64::from(x) + 0.5, f64::from(y) + 0.5))
+    }
+
+    /// The ray through a point of the picture, in pixels: `(x + 0.5, y + 0.5)` is a pixel's centre.
+    pub fn integrate_ray(&self, point: DVec2) -> Sample {
+        self.integrate(self.view.ray_at_unit_depth(point)).0
+    }
+
+    /// The length, in world units, of the same ray inside the shell and beyond the near plane: the sum over
+    /// tetrahedra, so that what overlaps counts as often as it is covered.
+    pub fn path_length(&self, point: DVec2) -> f64 {
+        let direction = self.view.ray_at_unit_depth(point);
+        let mut crossings = Vec::new();
+        self.crossings.find(direction, &mut crossings);
+        direction.length() * crossings.iter().map(|crossing| crossing.exit - crossing.enter).sum::<f64>()
+    }
+
+    fn integrate(&self, direction: DVec3) -> (Sample, Counts) {
+        let mut crossings = Vec::new();
+        self.crossings.find(direction, &mut crossings);
+        RayIntegral::evaluate(self, direction, &crossings)
+    }
+}
+
+/// Renders `view` of the scene (`scene.view` is not read) on all threads of the current rayon pool. The
+/// picture does not depend on their number.
+///
+/// # Errors
+/// [`Error::Interrupted`](crate::Error::Interrupted) soon after the flag is set.
+pub fn render(scene: &Scene, view: &View, progress: &dyn Progress, interrupt: &Interrupt) -> Result<Frame> {
+    let mut stopwatch = Stopwatch::start();
+    progress.stage("building the bounding volume hierarchy");
+    let reference = Reference::new(scene, view);
+    stopwatch.lap("hierarchy");
+
+    progress.stage("integrating rays");
+    let rows_done = AtomicU32::new(0);
+    let row = |y: u32| -> Result<(Vec<Sample>, Counts)> {
+        interrupt.check()?;
+        let mut counts = Counts::default();
+        let samples = (0..view.width).map(|x| {
+            let point = DVec2::new(f64::from(x) + 0.5, f64::from(y) + 0.5);
+            let (sample, added) = reference.integrate(view.ray_at_unit_depth(point));
+            counts = counts.add(added);
+            sample
+        });
+        let samples = samples.collect();
+        let done = rows_done.fetch_add(1, Ordering::Relaxed) + 1;
+        progress.fraction(f64::from(done) / f64::from(view.height));
+        Ok((samples, counts))
+    };
+    let rows: Vec<_> = (0..view.height).into_par_iter().map(row).collect::<Result<_>>()?;
+    stopwatch.lap("integrate");
+
+    let samples = || rows.iter().flat_map(|(samples, _)| samples);
+    let image = Image {
+        width: view.width,
+        height: view.height,
+        rgba: samples().map(|sample| sample.rgba.map(|channel| channel as f32)).collect(),
+    };
+    let depth = view.depth.then(|| samples().map(|sample| sample.depth as f32).collect());
+    let counts = rows.iter().fold(Counts::default(), |sum, (_, counts)| sum.add(*counts));
+    let covered = samples().filter(|sample| sample.rgba[3] > 0.0).count() as u64;
+    let report = Report {
+        method: "reference".into(),
+        device: "cpu".into(),
+        stages: stopwatch.finish(),
+        counts: [
+            ("rays", counts.rays),
+            ("segments", counts.segments),
+            ("panels", counts.panels),
+            ("pixels_covered", covered),
+        ]
+        .map(|(name, count)| (name.to_owned(), count))
+        .into(),
+        ..Report::default()
+    };
+    Ok(Frame { image, depth, report })
+}
+
+/// The largest ratio of premultiplied colour to alpha over all texels that have alpha, at least 1. An
+/// interpolated colour is a weighted mean of such ratios, so nothing in the scene is brighter.
+fn brightness(scene: &Scene) -> f64 {
+    let texels = scene.volume.levels.par_iter().flat_map(|level| level.texels.par_iter());
+    let visible = texels.filter(|texel| texel[3] > 0.0);
+    visible
+        .map(|texel| f64::from(texel[0].max(texel[1]).max(texel[2])) / f64::from(texel[3]))
+        .reduce(|| 1.0, f64::max)
+}

@@ -2,10 +2,10 @@
 
 use glam::Vec3;
 
+use super::Pattern;
 use super::grid::{Grid, premultiplied, smoothstep};
 use super::keys::{Colour, keys, srgb};
-use super::noise::Octaves;
-use super::Pattern;
+use super::noise::{Octaves, gradient};
 
 keys! {
     /// The keys of `recipe = "fog"`.
@@ -18,6 +18,8 @@ keys! {
         octaves: u32 = 4, 1..=10;
         /// How much the noise tears the fog apart: 0 is an even layer, 1 leaves holes.
         contrast: f32 = 0.8, 0.0..=1.0;
+        /// How far the swirls are drawn out into wisps, in their own widths.
+        swirl: f32 = 0.5, 0.0..=2.0;
         /// How high the fog reaches, as a share of the shell's thickness.
         reach: f32 = 0.95, 0.05..=1.0;
         /// Colour where the fog is thick.
@@ -27,13 +29,21 @@ keys! {
     }
 }
 
+impl Fog {
+    /// How far the fog at a point was blown, in tile widths.
+    fn wind(&self, position: Vec3, seed: u32) -> Vec3 {
+        let noise = |axis| gradient(position * self.scale as f32, [self.scale; 2], seed ^ axis);
+        Vec3::new(noise(0xa1), noise(0xa2), noise(0xa3)) * self.swirl / self.scale as f32
+    }
+}
+
 impl Pattern for Fog {
     fn draw(&self, grid: &Grid, seed: u32, texels: &mut [[f32; 4]]) {
         let swirls =
             Octaves { cells: self.scale, count: self.octaves, gain: 0.5, finest: grid.finest_noise() };
         grid.fill(texels, |position| {
             let level = position.z / grid.height;
-            let noise = swirls.gradient(position, seed);
+            let noise = swirls.gradient(position + self.wind(position, seed), seed);
             // The fog's ceiling rises and falls with the noise, so that its top is no plane.
             let ceiling = self.reach * (1. - 0.45 * self.contrast * (0.5 - 1.2 * noise).clamp(0., 1.));
             let thinning = smoothstep(ceiling, 0., level);

@@ -20,13 +20,13 @@ keys! {
     /// The keys of `recipe = "fur"`.
     Fur {
         /// Strands a tile.
-        density: u32 = 3500, 0..=100_000;
+        density: u32 = 3000, 0..=100_000;
         /// Height of the longest strands as a share of the shell's thickness.
         length: f32 = 0.95, 0.05..=1.0;
         /// How much shorter the shortest strands are, as a share of `length`.
-        length_variation: f32 = 0.5, 0.0..=1.0;
+        length_variation: f32 = 0.6, 0.0..=1.0;
         /// Radius of a strand at its root, in tile widths.
-        thickness: f32 = 0.006, 0.0005..=0.05;
+        thickness: f32 = 0.005, 0.0005..=0.05;
         /// How much thinner the tip is than the root: 1 is a point.
         taper: f32 = 0.85, 0.0..=1.0;
         /// Radius of the curls at the tip, in tile widths.
@@ -34,7 +34,7 @@ keys! {
         /// Turns that a curl makes from root to tip.
         curl_turns: f32 = 1.2, 0.0..=10.0;
         /// How far the tips lean over, as a share of the strand's height.
-        lean: f32 = 0.9, 0.0..=4.0;
+        lean: f32 = 0.8, 0.0..=4.0;
         /// Where the fur leans to: degrees from u towards v.
         direction: f32 = 30.0, -360.0..=360.0;
         /// How far the direction strays, in degrees.
@@ -42,17 +42,17 @@ keys! {
         /// Clumps along a tile's side.
         clumps: u32 = 9, 1..=256;
         /// How far the tips of a clump draw together: 0 not at all, 1 to a point.
-        clumping: f32 = 0.55, 0.0..=1.0;
-        /// Opacity of a strand's core over one voxel.
+        clumping: f32 = 0.7, 0.0..=1.0;
+        /// Opacity, over one voxel, of what strands fill entirely.
         opacity: f32 = 0.92, 0.0..=0.98;
         /// How dark the fur is at its roots: 0 as bright as at the tips, 1 black.
         occlusion: f32 = 0.8, 0.0..=1.0;
         /// Colour at the root.
-        root_colour: Colour = srgb(0x4a2c14);
+        root_colour: Colour = srgb(0x5a3418);
         /// Colour at the tip.
-        tip_colour: Colour = srgb(0xe0b070);
+        tip_colour: Colour = srgb(0xf0c078);
         /// How much strands differ in brightness.
-        colour_variation: f32 = 0.35, 0.0..=1.0;
+        colour_variation: f32 = 0.5, 0.0..=1.0;
         /// Colour of the skin.
         skin_colour: Colour = srgb(0x2a1a10);
     }
@@ -103,7 +103,8 @@ impl Fur {
         let top = height * self.length * (1. - shorter);
         let swirl = gradient((root * 2.).extend(0.5), [2; 2], seed);
         let stray = self.direction_variation.to_radians() * (0.35 * clump_turn + 1.2 * swirl + spread(0.25));
-        let leaning = Vec2::from_angle(self.direction.to_radians() + stray) * self.lean * top * (1. + spread(0.2));
+        let leaning =
+            Vec2::from_angle(self.direction.to_radians() + stray) * self.lean * top * (1. + spread(0.2));
         let phase = TAU * random(clump.id, seed ^ 0x33) + spread(0.8);
         let brightness = 1. + self.colour_variation * (0.5 * clump_turn + spread(0.7));
 
@@ -133,27 +134,27 @@ impl Fur {
             for (i, x) in grid.between(0, low.x, high.x) {
                 let position = Vec3::new(x, y, z);
                 let Some(nearest) = nearest_on(near, below, position, reach) else { continue };
-                let alpha = self.opacity_at(&nearest, grid.voxel());
-                if alpha > 0. {
+                let cover = self.cover_at(&nearest, grid.voxel());
+                if cover > 0. {
                     let colour = self.colour_at(strand, nearest.along, z / grid.height);
-                    lay_over(&mut slice[j * grid.size[0] + i], colour, alpha);
+                    lay_over(&mut slice[j * grid.size[0] + i], colour, cover);
                 }
             }
         }
     }
 
-    /// A strand thinner than a voxel keeps a voxel's width and pays with opacity.
-    fn opacity_at(&self, nearest: &Nearest, voxel: f32) -> f32 {
+    /// How much of a voxel the strand fills. One thinner than a voxel is drawn a voxel wide, and fainter.
+    fn cover_at(&self, nearest: &Nearest, voxel: f32) -> f32 {
         let radius = self.thickness * (1. - self.taper * nearest.along);
         let thinness = (2. * radius / voxel).min(1.);
         let tip = smoothstep(1., 0.7, nearest.along);
-        self.opacity * thinness * tip * smoothstep(radius + voxel, radius - voxel, nearest.distance)
+        thinness * tip * smoothstep(radius + voxel, radius - voxel, nearest.distance)
     }
 
     fn colour_at(&self, strand: &Strand, along: f32, level: f32) -> Vec3 {
         let colour = Vec3::lerp(self.root_colour.0, self.tip_colour.0, smoothstep(0., 1., along));
         let light = 1. - self.occlusion * (1. - smoothstep(-0.2, 0.9, level));
-        colour * strand.brightness * light
+        colour * strand.brightness * light * light
     }
 }
 
@@ -180,12 +181,15 @@ impl Pattern for Fur {
         let skin = self.skin_colour.0;
         grid.slices(texels, |k, slice| {
             let z = grid.position(0, 0, k).z;
-            let cover = self.opacity * smoothstep(3. * grid.voxel(), 0., z);
+            let cover = smoothstep(3. * grid.voxel(), 0., z);
             for texel in slice.iter_mut() {
                 lay_over(texel, skin * (1. - self.occlusion), cover);
             }
             for strand in &strands {
                 self.draw_strand(strand, grid, z, slice);
+            }
+            for texel in slice {
+                *texel = texel.map(|channel| channel * self.opacity);
             }
         });
     }

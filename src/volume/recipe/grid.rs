@@ -69,9 +69,8 @@ impl Grid {
         let count = self.size[axis] as i64;
         let first = (from * count as f32 - 0.5).ceil() as i64;
         let last = ((to * count as f32 - 0.5).floor() as i64).min(first + count - 1);
-        (first..=last).map(move |index| {
-            (index.rem_euclid(count) as usize, (index as f32 + 0.5) / count as f32)
-        })
+        (first..=last)
+            .map(move |index| (index.rem_euclid(count) as usize, (index as f32 + 0.5) / count as f32))
     }
 }
 

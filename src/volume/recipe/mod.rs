@@ -10,11 +10,13 @@
 //! [`Header`] lists the keys that every recipe has; [`Fog`], [`Fur`] and the others list their own. A recipe
 //! yields the same bytes whatever the number of threads, and its volume repeats in u and v without a seam.
 
+mod clouds;
 mod fog;
 mod fur;
 mod grid;
 mod keys;
 mod noise;
+mod rocks;
 mod weave;
 
 use std::collections::BTreeMap;
@@ -27,9 +29,11 @@ use miette::NamedSource;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue, ValueDeserializer};
 
+pub use clouds::Clouds;
 pub use fog::Fog;
 pub use fur::Fur;
 pub use keys::Colour;
+pub use rocks::Rocks;
 pub use weave::Weave;
 
 use super::Volume;
@@ -41,8 +45,13 @@ use keys::{Keys, keys};
 pub const MAX_TEXELS: u64 = 1 << 28;
 
 /// Every recipe, by the name that a file calls it.
-const RECIPES: &[(&str, Reader)] =
-    &[("fog", read_pattern::<Fog>), ("fur", read_pattern::<Fur>), ("weave", read_pattern::<Weave>)];
+const RECIPES: &[(&str, Reader)] = &[
+    ("clouds", read_pattern::<Clouds>),
+    ("fog", read_pattern::<Fog>),
+    ("fur", read_pattern::<Fur>),
+    ("rocks", read_pattern::<Rocks>),
+    ("weave", read_pattern::<Weave>),
+];
 
 type Reader = fn(&Source, DeTable) -> Result<Arc<dyn Pattern>>;
 

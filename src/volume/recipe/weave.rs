@@ -18,13 +18,13 @@ keys! {
         /// Pairs of threads a tile, in each direction: a pair because the weave repeats every two threads.
         pairs: u32 = 4, 1..=256;
         /// Width of a thread as a share of the distance to the next one.
-        width: f32 = 0.84, 0.1..=1.0;
+        width: f32 = 0.76, 0.1..=1.0;
         /// Thickness of a thread as a share of its width: 1 is round. Less where the shell is too thin.
         roundness: f32 = 0.75, 0.1..=1.0;
         /// Turns of the yarn around itself a tile.
         twist: u32 = 6, 0..=256;
         /// How strongly the fibres show.
-        fibres: f32 = 0.35, 0.0..=1.0;
+        fibres: f32 = 0.6, 0.0..=1.0;
         /// How much the threads differ from one another in brightness.
         variation: f32 = 0.25, 0.0..=1.0;
         /// How dark the cloth is between and under the threads.
@@ -72,11 +72,16 @@ impl Weave {
         const ALONG: u32 = 10;
         const ACROSS: f32 = 3.5;
         const APART: f32 = 64.;
-        let turned = Vec2::from_angle(TAU * (self.twist as f32 * along + random(thread, seed))).rotate(section);
-        let point = Vec3::new(along * ALONG as f32, turned.x * ACROSS + APART * thread as f32, turned.y * ACROSS);
+        let turned =
+            Vec2::from_angle(TAU * (self.twist as f32 * along + random(thread, seed))).rotate(section);
+        let point =
+            Vec3::new(along * ALONG as f32, turned.x * ACROSS + APART * thread as f32, turned.y * ACROSS);
         let fibre = gradient(point, [ALONG, 1 << 20], seed);
         let brightness = 1. + self.variation * (random(thread, seed ^ 0x51) - 0.5) * 2.;
-        colour * brightness * (1. + self.fibres * 2. * fibre)
+        // Skylight: the sides of a thread see less of it than its back.
+        let facing = section.y / section.length().max(0.5);
+        let light = 1. - 0.6 * self.occlusion * smoothstep(1., -0.3, facing);
+        colour * brightness * light * (1. + self.fibres * 2. * fibre)
     }
 }
 
@@ -113,7 +118,10 @@ impl Pattern for Weave {
             let level = (position.z - cloth.middle) / (2. * cloth.half_thickness);
             let light = 1. - self.occlusion * smoothstep(1., -0.8, level);
             let mut threads = [
-                (&weft, self.yarn(self.weft_colour.0, weft_index + cloth.threads, position.x, weft.section, seed)),
+                (
+                    &weft,
+                    self.yarn(self.weft_colour.0, weft_index + cloth.threads, position.x, weft.section, seed),
+                ),
                 (&warp, self.yarn(self.warp_colour.0, warp_index, position.y, warp.section, seed)),
             ];
             if warp.distance > weft.distance {

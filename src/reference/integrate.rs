@@ -1,0 +1,350 @@
+//! The integral along one ray: `C = integral of T sigma c`, `T = exp(-integral of sigma)`, front to back.
+//!
+//! The ray is cut where the set of tetrahedra changes, where a level of detail is an integer, and at the
+//! planes of texel centres. On the *pieces* between, the premultiplied texture is a cubic (a smooth blend of
+//! two, between levels), and `sigma` is smooth unless alpha reaches 1. A *panel* is a piece, or
+//! a binary fraction of one: extinction and emission are taken at the nodes of [`Rule`], the optical depth
+//! at each node is the integral of the interpolant of `sigma`, and the colour follows with
+//! `T = exp(-depth)`. The panel is halved while the nested coarse rule disagrees.
+//!
+//! # The promise
+//! A panel passes when its error is at most `tolerance / 2 (length / ray's length + 1e-5)`; the first terms add up to
+//! `tolerance / 2` and so do the second ones for any ray of fewer than 1e5 panels. The error of
+//! a panel is weighted by the transmittance before it, and an error of its own transmittance by the largest
+//! colour that may follow.
+//!
+//! # Where alpha reaches 1
+//! `1 - alpha` is a cubic, so at a point at distance `x` from a root it is at least about `x^3`, and a panel of length
+//! `h` at the root holds an optical depth of at most `3 h (1 + ln(1 / h)) / opacity_distance` (`h` as a part
+//! of the piece inside the logarithm). Halving towards the root is therefore graded: each step adds one smooth
+//! panel that passes, and the one that does not shrinks until its whole content is below the second
+//! term, after some 35 steps. Where rounding leaves no midpoint (`h` below 1e-15 of the piece) it is taken as it is: by
+//! the same bound what is left is below 1e-13 for pieces of one `opacity_distance`.
+
+use glam::DVec3;
+
+use super::crossing::Crossing;
+use super::quadrature::{AtNodes, NODES, Rule, dot};
+use super::texture::{ALPHA, CLEAR, Cubic, Lattice};
+use super::{Counts, Reference, Sample};
+use crate::scene::Scene;
+
+/// One tetrahedron's medium along a span in which its levels do not change.
+struct Layer<'a> {
+    /// The level of detail at depth `z` is `log2(detail * z)`.
+    detail: f64,
+    /// The finer level in play.
+    level: f64,
+    fine: Lattice<'a>,
+    /// The next level, if the level of detail lies between the two.
+    coarse: Option<Lattice<'a>>,
+    /// Of the current piece.
+    fine_cubic: Cubic,
+    coarse_cubic: Cubic,
+}
+
+/// What a panel adds to the ray, as if nothing were in front of it.
+struct Panel {
+    transmittance: f64,
+    /// Premultiplied.
+    color: [f64; 3],
+    alpha: f64,
+    /// `integral of T sigma (z - near end) dz`.
+    moment: f64,
+    error: f64,
+}
+
+/// A part of the ray between two neighbouring cuts.
+#[derive(Clone, Copy)]
+struct Piece {
+    /// Depth of the near end.
+    start: f64,
+    /// In depth.
+    length: f64,
+}
+
+/// Integrates along one ray.
+pub(super) struct RayIntegral<'a> {
+    scene: &'a Scene,
+    rule: &'a Rule,
+    direction: DVec3,
+    /// World units per unit depth.
+    stretch: f64,
+    eye: DVec3,
+    detail_per_texel: f64,
+    tolerance: f64,
+    brightness: f64,
+    /// In depth; counts overlapping tetrahedra once each.
+    total_length: f64,
+    layers: Vec<Layer<'a>>,
+    transmittance: f64,
+    color: [f64; 3],
+    alpha: f64,
+    /// `integral of T sigma z dz`.
+    moment: f64,
+    counts: Counts,
+}
+
+impl<'a> RayIntegral<'a> {
+    /// The integral over `crossings`, which are in order of entry.
+    pub(super) fn evaluate(
+        reference: &'a Reference<'a>,
+        direction: DVec3,
+        crossings: &[Crossing],
+    ) -> (Sample, Counts) {
+        let mut integral = Self {
+            scene: reference.scene,
+            rule: &reference.rule,
+            direction,
+            stretch: direction.length(),
+            eye: reference.view.camera.eye,
+            detail_per_texel: reference.scene.medium.lod_footprint * reference.view.pixel_at_unit_depth(),
+            tolerance: reference.tolerance,
+            brightness: reference.brightness,
+            total_length: crossings.iter().map(|crossing| crossing.exit - crossing.enter).sum(),
+            layers: Vec::new(),
+            transmittance: 1.0,
+            color: [0.0; 3],
+            alpha: 0.0,
+            moment: 0.0,
+            counts: Counts { rays: 1, ..Counts::default() },
+        };
+        integral.sweep(crossings);
+        let [r, g, b] = integral.color;
+        let distance = integral.moment / integral.alpha * integral.stretch;
+        let sample = Sample {
+            rgba: [r, g, b, integral.alpha.min(1.0)],
+            depth: if integral.alpha > 0.0 { distance } else { f64::INFINITY },
+        };
+        (sample, integral.counts)
+    }
+
+    /// Goes from one entry or exit to the next with the tetrahedra that are active between them.
+    fn sweep(&mut self, crossings: &[Crossing]) {
+        let mut ends: Vec<f64> = crossings.iter().flat_map(|c| [c.enter, c.exit]).collect();
+        ends.sort_unstable_by(f64::total_cmp);
+        let mut waiting = crossings;
+        let mut active: Vec<Crossing> = Vec::new();
+        for window in ends.windows(2) {
+            let [from, to] = [window[0], window[1]];
+            let entered = waiting.iter().take_while(|crossing| crossing.enter <= from).count();
+            active.extend_from_slice(&waiting[..entered]);
+            waiting = &waiting[entered..];
+            active.retain(|crossing| crossing.exit > from);
+            if from < to && !active.is_empty() {
+                self.counts.segments += 1;
+                self.segment(from, to, &active);
+                if self.is_done() {
+                    return;
+                }
+            }
+        }
+    }
+
+    /// Whether nothing that may follow can change the result by a thousandth of the tolerance.
+    fn is_done(&self) -> bool {
+        self.transmittance * self.brightness < 1e-3 * self.tolerance
+    }
+
+    /// Cuts a segment where a level of detail is an integer.
+    fn segment(&mut self, from: f64, to: f64, active: &[Crossing]) {
+        let last_level = self.scene.volume.levels.len() - 1;
+        let details: Vec<f64> = active
+            .iter()
+            .map(|crossing| self.detail_per_texel * self.scene.texels_per_unit(crossing.tetrahedron))
+            .collect();
+        let mut start = from;
+        while start < to && !self.is_done() {
+            let integer_levels = details
+                .iter()
+                .flat_map(|detail| (0..=last_level).map(move |level| (level as f64).exp2() / detail));
+            let end = integer_levels.filter(|&depth| depth > start).fold(to, f64::min);
+            self.layers.clear();
+            for (crossing, &detail) in active.iter().zip(&details) {
+                let layer = self.layer(crossing.tetrahedron, detail, start, 0.5 * (start + end));
+                self.layers.push(layer);
+            }
+            self.span(start, end);
+            start = end;
+        }
+    }
+
+    fn layer(&self, tetrahedron: usize, detail: f64, start: f64, middle: f64) -> Layer<'a> {
+        let shell = &self.scene.shell;
+        let levels = &self.scene.volume.levels;
+        let first_vertex = shell.vertices[shell.topology.tetrahedra[tetrahedron][0] as usize];
+        let texture_from_world = shell.cells[tetrahedron].texture_from_world;
+        let from_vertex = (self.eye - first_vertex) + start * self.direction;
+        let texture = shell.texture[tetrahedron][0] + texture_from_world * from_vertex;
+        let slope = texture_from_world * self.direction;
+        let last = levels.len() - 1;
+        let level_of_detail = (detail * middle).log2().clamp(0.0, last as f64);
+        let level = level_of_detail as usize;
+        let is_between = level_of_detail > 0.0 && level < last;
+        Layer {
+            detail,
+            level: level as f64,
+            fine: Lattice::new(&levels[level], texture, slope),
+            coarse: is_between.then(|| Lattice::new(&levels[level + 1], texture, slope)),
+            fine_cubic: Cubic::EMPTY,
+            coarse_cubic: Cubic::EMPTY,
+        }
+    }
+
+    /// Visits the pieces of a span with its layers, front to back.
+    fn span(&mut self, start: f64, end: f64) {
+        let length = end - start;
+        let mut from = 0.0;
+        while from < length && !self.is_done() {
+            let lattices = self.layers.iter_mut().flat_map(Layer::lattices);
+            let to = lattices.fold(length, |to, lattice| to.min(lattice.next_crossing()));
+            if from < to {
+                self.piece(start, from, to);
+            }
+            self.layers.iter_mut().flat_map(Layer::lattices).for_each(|lattice| lattice.pass(to));
+            from = from.max(to);
+        }
+    }
+
+    fn piece(&mut self, span_start: f64, from: f64, to: f64) {
+        let mut is_empty = true;
+        for layer in &mut self.layers {
+            is_empty &= !layer.load(from, to);
+        }
+        if is_empty {
+            return;
+        }
+        let piece = Piece { start: span_start + from, length: to - from };
+        if self.layers.iter().any(Layer::is_wall) {
+            self.stop_at_wall(piece.start);
+        } else {
+            self.panels(piece, 0.0, 1.0);
+        }
+    }
+
+    /// What reaches a wall sees the wall's colour at that point; of several, their mean.
+    fn stop_at_wall(&mut self, depth: f64) {
+        let walls: Vec<_> = self.layers.iter().filter(|layer| layer.is_wall()).collect();
+        let part = self.transmittance / walls.len() as f64;
+        for layer in walls {
+            let texel = layer.at(0.0, depth);
+            for (sum, premultiplied) in self.color.iter_mut().zip(texel) {
+                *sum += part * premultiplied;
+            }
+        }
+        self.alpha += self.transmittance;
+        self.moment += self.transmittance * depth;
+        self.transmittance = 0.0;
+    }
+
+    /// Adds the part `low..high` (of 0..1) of a piece, halving it until it is accurate.
+    fn panels(&mut self, piece: Piece, low: f64, high: f64) {
+        let panel = self.panel(piece, low, high);
+        let width = high - low;
+        let share = width * piece.length / self.total_length + 1e-5;
+        let middle = low + 0.5 * width;
+        let can_halve = width > 1e-15 && low < middle && middle < high;
+        if can_halve && self.transmittance * panel.error > 0.5 * self.tolerance * share {
+            self.panels(piece, low, middle);
+            if !self.is_done() {
+                self.panels(piece, middle, high);
+            }
+            return;
+        }
+        for (sum, color) in self.color.iter_mut().zip(panel.color) {
+            *sum += self.transmittance * color;
+        }
+        let start = piece.start + low * piece.length;
+        self.alpha += self.transmittance * panel.alpha;
+        self.moment += self.transmittance * (start * panel.alpha + panel.moment);
+        self.transmittance *= panel.transmittance;
+    }
+
+    fn panel(&mut self, piece: Piece, low: f64, high: f64) -> Panel {
+        self.counts.panels += 1;
+        let rule = self.rule;
+        let width = high - low;
+        let opacity_distance = self.scene.medium.opacity_distance;
+        let mut extinction: AtNodes = [0.0; NODES];
+        let mut emission: [AtNodes; 3] = [[0.0; NODES]; 3];
+        for i in 0..NODES {
+            let x = low + width * rule.nodes[i];
+            for layer in &self.layers {
+                let texel = layer.at(x, piece.start + x * piece.length);
+                let per_alpha = extinction_per_alpha(texel[ALPHA], texel[CLEAR]);
+                extinction[i] += per_alpha * texel[ALPHA];
+                for (emission, premultiplied) in emission.iter_mut().zip(texel) {
+                    emission[i] += per_alpha * premultiplied;
+                }
+            }
+        }
+        // From per opacity distance to per panel.
+        let length = width * piece.length;
+        let scale = length * self.stretch / opacity_distance;
+        let mut optical_depth: AtNodes = [0.0; NODES];
+        for (extinction, cumulative) in extinction.iter_mut().zip(&rule.cumulative) {
+            *extinction *= scale;
+            for (depth, cumulative) in optical_depth.iter_mut().zip(cumulative) {
+                *depth += *extinction * cumulative;
+            }
+        }
+        let transmittance = optical_depth.map(|depth| (-depth).exp());
+        let absorbed: AtNodes = std::array::from_fn(|i| transmittance[i] * extinction[i]);
+        let total_depth = dot(&rule.weights, &extinction);
+        let alpha = -(-total_depth).exp_m1();
+        let coarse_alpha = -(-dot(&rule.coarse_weights, &extinction)).exp_m1();
+        let mut error = self.brightness * (alpha - coarse_alpha).abs();
+        error = error.max((alpha - dot(&rule.weights, &absorbed)).abs());
+        error = error.max((alpha - dot(&rule.coarse_weights, &absorbed)).abs());
+        let color = emission.map(|emission| {
+            let arriving: AtNodes = std::array::from_fn(|i| transmittance[i] * scale * emission[i]);
+            let color = dot(&rule.weights, &arriving);
+            error = error.max((color - dot(&rule.coarse_weights, &arriving)).abs());
+            color
+        });
+        let moment: f64 = (0..NODES).map(|i| rule.weights[i] * absorbed[i] * rule.nodes[i]).sum();
+        Panel { transmittance: (-total_depth).exp(), color, alpha, moment: moment * length, error }
+    }
+}
+
+impl<'a> Layer<'a> {
+    fn lattices<'b>(&'b mut self) -> impl Iterator<Item = &'b mut Lattice<'a>> {
+        std::iter::once(&mut self.fine).chain(self.coarse.as_mut())
+    }
+
+    /// Loads the cubics of a piece; whether there is anything in it.
+    fn load(&mut self, from: f64, to: f64) -> bool {
+        let fine = self.fine.cubic(from, to);
+        let coarse = self.coarse.as_mut().and_then(|lattice| lattice.cubic(from, to));
+        self.fine_cubic = fine.unwrap_or(Cubic::EMPTY);
+        self.coarse_cubic = coarse.unwrap_or(Cubic::EMPTY);
+        fine.is_some() || coarse.is_some()
+    }
+
+    fn is_wall(&self) -> bool {
+        self.fine_cubic.is_wall() && (self.coarse.is_none() || self.coarse_cubic.is_wall())
+    }
+
+    /// The texture at `x` (0..1) of the piece, at depth `z`.
+    fn at(&self, x: f64, z: f64) -> super::texture::Texel {
+        let fine = self.fine_cubic.at(x);
+        if self.coarse.is_none() {
+            return fine;
+        }
+        let coarse = self.coarse_cubic.at(x);
+        let part = ((self.detail * z).log2() - self.level).clamp(0.0, 1.0);
+        std::array::from_fn(|c| (1.0 - part) * fine[c] + part * coarse[c])
+    }
+}
+
+/// `-ln(1 - alpha) / alpha`, whose limit at 0 is 1, from alpha and its complement, each accurate where it is
+/// the smaller. Finite even where rounding makes the complement zero.
+fn extinction_per_alpha(alpha: f64, clear: f64) -> f64 {
+    if alpha < 1e-8 {
+        1.0 + 0.5 * alpha
+    } else if alpha < 0.5 {
+        -(-alpha).ln_1p() / alpha
+    } else {
+        -clear.max(f64::MIN_POSITIVE).ln() / alpha
+    }
+}

@@ -1,0 +1,164 @@
+//! The texture along a ray: trilinear reconstruction as one cubic polynomial a cell.
+//!
+//! Texel centres lie at `(i + 1/2) / n`; u and v repeat, w clamps to the edge (DESIGN section 1, and
+//! Vulkan 1.3, "Texel Filtering"). A *cell* is the box between eight neighbouring texel centres. Texture
+//! coordinates are affine in the ray's depth, so within a cell the reconstruction is a product of
+//! three linear functions: a cubic, kept in Bernstein form. Its coefficients are weighted means
+//! of the corners, so `1 - alpha` is a sum of terms that are not negative and keeps its relative accuracy
+//! where alpha comes near 1, as a power basis would not.
+
+use glam::DVec3;
+
+use crate::volume::Volume;
+
+/// Premultiplied red, green, blue, then alpha, then `1 - alpha`.
+pub type Texel = [f64; 5];
+
+/// Index of alpha in a [`Texel`].
+pub const ALPHA: usize = 3;
+/// Index of `1 - alpha` in a [`Texel`].
+pub const CLEAR: usize = 4;
+
+/// A texel cubic over a piece of a ray, in Bernstein form over `0..1`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Cubic(pub [Texel; 4]);
+
+impl Cubic {
+    /// Neither colour nor opacity anywhere.
+    pub const EMPTY: Self = Self([[0.0, 0.0, 0.0, 0.0, 1.0]; 4]);
+
+    /// Whether alpha is 1 all along the piece.
+    pub fn is_wall(&self) -> bool {
+        self.0.iter().all(|texel| texel[CLEAR] == 0.0)
+    }
+
+    /// The value at `x` in `0..=1`.
+    pub fn at(&self, x: f64) -> Texel {
+        let y = 1.0 - x;
+        let basis = [y * y * y, 3.0 * x * y * y, 3.0 * x * x * y, x * x * x];
+        std::array::from_fn(|c| (0..4).map(|k| basis[k] * self.0[k][c]).sum())
+    }
+}
+
+/// Where a ray meets the texel lattice of one level: visited cell by cell, front to back.
+#[derive(Debug, Clone)]
+pub struct Lattice<'a> {
+    volume: &'a Volume,
+    /// The texel whose centre is the origin of `start`, before wrapping.
+    base: DVec3,
+    /// Lattice coordinates at the start of the span, relative to `base`, each in 0..1.
+    start: DVec3,
+    /// Change of lattice coordinates per unit depth.
+    slope: DVec3,
+    /// The next lattice plane ahead on each axis, relative to `base`.
+    plane: DVec3,
+    /// The depth, from the start of the span, of that plane.
+    crossing: DVec3,
+    /// The loaded cell, relative to `base`.
+    cell: DVec3,
+    corners: [Texel; 8],
+    corners_are_empty: bool,
+}
+
+impl<'a> Lattice<'a> {
+    /// For a span that starts at the texture-space point `start` and moves by `slope` per unit depth.
+    pub fn new(volume: &'a Volume, start: DVec3, slope: DVec3) -> Self {
+        let size = DVec3::from_array(volume.size.map(f64::from));
+        let (start, slope) = (start * size - 0.5, slope * size);
+        let base = start.floor();
+        let start = start - base;
+        // From exactly a plane, backwards: the next one is a whole cell away.
+        let plane = DVec3::from_array(std::array::from_fn(|i| {
+            if slope[i] > 0.0 || start[i] > 0.0 { f64::from(u8::from(slope[i] > 0.0)) } else { -1.0 }
+        }));
+        let mut lattice = Self {
+            volume,
+            base,
+            start,
+            slope,
+            plane,
+            crossing: DVec3::INFINITY,
+            cell: DVec3::NAN,
+            corners: [[0.0; 5]; 8],
+            corners_are_empty: true,
+        };
+        (0..3).for_each(|axis| lattice.find_crossing(axis));
+        lattice
+    }
+
+    fn find_crossing(&mut self, axis: usize) {
+        if self.slope[axis] != 0.0 {
+            self.crossing[axis] = (self.plane[axis] - self.start[axis]) / self.slope[axis];
+        }
+    }
+
+    /// The depth, from the start of the span, at which the current cell ends.
+    pub fn next_crossing(&self) -> f64 {
+        self.crossing.min_element()
+    }
+
+    /// Passes all planes up to `depth`.
+    pub fn pass(&mut self, depth: f64) {
+        for axis in 0..3 {
+            while self.crossing[axis] <= depth {
+                self.plane[axis] += self.slope[axis].signum();
+                self.find_crossing(axis);
+            }
+        }
+    }
+
+    /// The reconstruction between two depths within one cell; `None` where it is empty.
+    pub fn cubic(&mut self, from: f64, to: f64) -> Option<Cubic> {
+        let cell = (self.start + self.slope * (0.5 * (from + to))).floor();
+        if cell != self.cell {
+            self.load(cell);
+        }
+        if self.corners_are_empty {
+            return None;
+        }
+        let within = |depth: f64| (self.start + self.slope * depth - cell).clamp(DVec3::ZERO, DVec3::ONE);
+        let (near, far) = (within(from), within(to));
+        // The corners of the box that the piece spans: bit i of a corner's index says near or far on axis i.
+        let mut corners = self.corners;
+        for axis in 0..3 {
+            let bit = 1 << axis;
+            for low in (0..8).filter(|corner| corner & bit == 0) {
+                let (a, b) = (corners[low], corners[low | bit]);
+                corners[low] = lerp(&a, &b, near[axis]);
+                corners[low | bit] = lerp(&a, &b, far[axis]);
+            }
+        }
+        // The blossom of a product of three linear functions: means over the corners with k far axes.
+        let mean = |[i, j, k]: [usize; 3]| -> Texel {
+            std::array::from_fn(|c| (corners[i][c] + corners[j][c] + corners[k][c]) / 3.0)
+        };
+        Some(Cubic([corners[0], mean([1, 2, 4]), mean([3, 5, 6]), corners[7]]))
+    }
+
+    fn load(&mut self, cell: DVec3) {
+        let size = self.volume.size;
+        let first = self.base + cell;
+        // [axis][near or far]
+        let index: [[usize; 2]; 3] = std::array::from_fn(|axis| {
+            let count = f64::from(size[axis]);
+            [0.0, 1.0].map(|step| {
+                let texel = first[axis] + step;
+                let wrapped = if axis == 2 { texel.clamp(0.0, count - 1.0) } else { texel.rem_euclid(count) };
+                wrapped as usize
+            })
+        });
+        let row = size[0] as usize;
+        let slice = row * size[1] as usize;
+        self.corners = std::array::from_fn(|corner| {
+            let [u, v, w] = std::array::from_fn(|axis| index[axis][(corner >> axis) & 1]);
+            let [r, g, b, a] = self.volume.texels[u + v * row + w * slice].map(f64::from);
+            [r, g, b, a, 1.0 - a]
+        });
+        self.corners_are_empty = self.corners.iter().all(|texel| texel[..=ALPHA] == [0.0; 4]);
+        self.cell = cell;
+    }
+}
+
+fn lerp(a: &Texel, b: &Texel, x: f64) -> Texel {
+    std::array::from_fn(|c| (1.0 - x) * a[c] + x * b[c])
+}
