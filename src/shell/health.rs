@@ -127,7 +127,7 @@ mod tests {
     fn faults_are_told_apart() {
         let faults = |vertices: [DVec3; 4]| {
             let determinant = cell::determinant(vertices);
-            let found = cell::maps(&vertices, [0, 1, 2, 3], &REGULAR, determinant);
+            let found = cell::maps(vertices, REGULAR, determinant);
             let Faults { inverted, zero_volume, slivers } = Faults::of(vertices, determinant, &found);
             [inverted, zero_volume, slivers]
         };
