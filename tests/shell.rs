@@ -10,7 +10,7 @@ use std::sync::Arc;
 use glam::{DVec2, DVec3, DVec4};
 use mesoshell::mesh::Mesh;
 use mesoshell::mesh::generate::{Generator, Plane, Sphere, Teapot, Torus, Tube};
-use mesoshell::shell::{Cell, EXTERIOR, Health, Shell, ShellOptions, Topology};
+use mesoshell::shell::{Cell, EXTERIOR, Shell, ShellOptions, Topology};
 use proptest::prelude::*;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
@@ -61,27 +61,6 @@ fn all() -> [(&'static str, Mesh); 6] {
         ("torus", torus()),
         ("teapot", teapot()),
     ]
-}
-
-/// `count` copies of the unit triangle, side by side and apart.
-fn row(count: u32) -> Mesh {
-    let mut mesh = Mesh::default();
-    for i in 0..count {
-        let at = DVec3::X * 3.0 * f64::from(i);
-        mesh.positions.extend([at, at + DVec3::X, at + DVec3::Y]);
-        mesh.normals.extend([DVec3::Z; 3]);
-        mesh.triangles.push([3 * i, 3 * i + 1, 3 * i + 2]);
-        mesh.uvs.push([DVec2::ZERO, DVec2::X, DVec2::Y]);
-    }
-    mesh
-}
-
-/// The same surface with its other side out.
-fn inside_out(mut mesh: Mesh) -> Mesh {
-    mesh.normals.iter_mut().for_each(|normal| *normal = -*normal);
-    mesh.triangles.iter_mut().for_each(|ids| ids.swap(1, 2));
-    mesh.uvs.iter_mut().for_each(|uvs| uvs.swap(1, 2));
-    mesh
 }
 
 fn moved(mut mesh: Mesh, place: impl Fn(DVec3) -> DVec3) -> Mesh {
@@ -448,89 +427,6 @@ fn the_number_of_threads_changes_no_bit() {
         pool.install(|| Shell::build(&teapot(), &options).expect("a sound mesh"))
     });
     assert_eq!(built[0], built[1]);
-}
-
-// ---- health ----
-
-fn health(mesh: &Mesh, options: &ShellOptions) -> Health {
-    Shell::build(mesh, options).expect("a sound mesh").health
-}
-
-#[test]
-fn sound_shells_have_no_faults() {
-    for (mesh, boundary_edges) in [(plane(), 16), (sphere(), 0), (torus(), 0)] {
-        let expected =
-            Health { tetrahedra: 3 * mesh.triangles.len() as u64, boundary_edges, ..Health::default() };
-        assert_eq!(health(&mesh, &ShellOptions::new(0.1)), expected);
-    }
-}
-
-#[test]
-fn planted_faults_are_counted_exactly() {
-    let sound = Health { tetrahedra: 21, boundary_edges: 21, ..Health::default() };
-    let mut mesh = row(7);
-    let mut options = ShellOptions { thickness_scale: vec![1.0; 21], ..ShellOptions::new(0.5) };
-    assert_eq!(health(&mesh, &options), sound);
-
-    mesh.normals[0..3].fill(-DVec3::Z);
-    assert_eq!(health(&mesh, &options), Health { inverted: 3, ..sound });
-
-    // Flat over one vertex: one tetrahedron of that prism. Flat over all: three.
-    options.thickness_scale[4] = 0.0;
-    assert_eq!(health(&mesh, &options), Health { inverted: 3, zero_volume: 1, ..sound });
-    options.thickness_scale[6..9].fill(0.0);
-    assert_eq!(health(&mesh, &options), Health { inverted: 3, zero_volume: 4, ..sound });
-
-    // Half legs, 1e-4 of a leg high: quality is near sqrt(2) 1e-4 / (7/6)^(3/2).
-    options.thickness_scale[9..12].fill(2e-4);
-    assert_eq!(health(&mesh, &options), Health { inverted: 3, zero_volume: 4, slivers: 3, ..sound });
-
-    // A second triangle that runs along an edge the same way as the first: it lies upside down.
-    mesh.positions.push(DVec3::new(12.5, -1.0, 0.0));
-    mesh.normals.push(DVec3::Z);
-    options.thickness_scale.push(1.0);
-    mesh.triangles.push([12, 13, 21]);
-    mesh.uvs.push([DVec2::ZERO; 3]);
-    let expected = Health {
-        tetrahedra: 24,
-        inverted: 6,
-        zero_volume: 4,
-        slivers: 3,
-        non_manifold_edges: 1,
-        boundary_edges: 22,
-        overlap_risk_vertices: 0,
-    };
-    assert_eq!(health(&mesh, &options), expected);
-}
-
-#[test]
-fn a_bowl_thicker_than_its_radius_is_at_risk_and_a_ball_is_not() {
-    let risk = |mesh: &Mesh, thickness| health(mesh, &ShellOptions::new(thickness)).overlap_risk_vertices;
-    let (ball, bowl) = (sphere(), inside_out(sphere()));
-    // On a sphere the estimate is the radius itself, up to rounding.
-    assert_eq!(risk(&bowl, 1.0 + 1e-9), bowl.positions.len() as u64);
-    assert_eq!(risk(&bowl, 1.0 - 1e-9), 0);
-    assert_eq!(risk(&ball, 100.0), 0);
-}
-
-#[test]
-fn only_the_thick_vertices_of_a_bowl_are_at_risk() {
-    let bowl = inside_out(sphere());
-    let mut options = ShellOptions::new(0.5);
-    options.thickness_scale = vec![1.0; bowl.positions.len()];
-    options.thickness_scale[10] = 2.1;
-    options.thickness_scale[20] = 2.1;
-    assert_eq!(health(&bowl, &options).overlap_risk_vertices, 2);
-}
-
-/// Around its hole a torus is concave: with radius 0.75 on the inner equator, and with radius
-/// `(1 + 0.25 cos v) / -cos v = 0.832` on the next of 16 rings, `v = pi - pi / 8`.
-#[test]
-fn a_torus_is_at_risk_on_its_inner_equator() {
-    let next = (PI - PI / 8.0).cos();
-    assert!(((1.0 + 0.25 * next) / -next - 0.832).abs() < 1e-3);
-    let risk = |thickness| health(&torus(), &ShellOptions::new(thickness)).overlap_risk_vertices;
-    assert_eq!([0.749, 0.751, 0.83, 0.84].map(risk), [0, 16, 16, 48]);
 }
 
 // ---- any prism ----
