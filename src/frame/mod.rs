@@ -1,5 +1,6 @@
 //! What a render yields: linear premultiplied RGBA, depth, and a report of how it was made.
 
+pub mod file;
 pub mod image;
 pub mod report;
 

@@ -78,17 +78,19 @@ impl Generator {
     /// The mesh.
     ///
     /// # Errors
-    /// [`Error::Usage`] when [`Generator::check`] objects.
+    /// [`Error::Usage`] when [`Generator::check`] objects, or should the mesh not be valid.
     pub fn build(&self) -> Result<Mesh> {
         self.check()?;
-        Ok(match self {
+        let mesh = match self {
             Self::Plane(plane) => plane.mesh(),
             Self::Tube(tube) => tube.mesh(),
             Self::Sphere(sphere) => sphere.mesh(),
             Self::Torus(torus) => torus.mesh(),
             Self::Vase(vase) => vase.mesh(),
             Self::Teapot(teapot) => teapot.mesh(),
-        })
+        };
+        mesh.validate().map_err(|message| Error::Usage { message, help: None })?;
+        Ok(mesh)
     }
 }
 

@@ -141,7 +141,7 @@ impl Sphere {
 pub struct Torus {
     /// From the axis to the middle of the tube, in world units; default 1.
     pub major_radius: f64,
-    /// Of the tube, in world units, less than the major radius; default 0.4.
+    /// Of the tube, in world units, from 1e-9 to less than 1 times the major radius; default 0.4.
     pub minor_radius: f64,
     /// Quads around the axis, 3 to 2048; default 48.
     pub segments: u32,
@@ -160,10 +160,11 @@ impl Torus {
         let default = Self::default();
         check_length("major_radius", self.major_radius, default.major_radius)?;
         check_length("minor_radius", self.minor_radius, default.minor_radius)?;
-        if self.minor_radius >= self.major_radius {
+        // Below, positions run together by rounding; above, the ring cuts itself.
+        if !(1e-9..1.0).contains(&(self.minor_radius / self.major_radius)) {
             let message = format!(
-                "is {}, but must be less than the major radius {}, or the ring cuts itself",
-                self.minor_radius, self.major_radius
+                "is {}, but must be less than the major radius {}, and at least 1e-9 of it (default {})",
+                self.minor_radius, self.major_radius, default.minor_radius
             );
             return Err(BadParameter { key: "minor_radius", message });
         }

@@ -160,16 +160,30 @@ impl Teapot {
         let spout = tube(self.spout_segments, self.spout_rings);
 
         let mut mesh = body.mesh(|u, v| around_axis(&BODY, u, v));
-        mesh.append(lid.mesh(|u, v| around_axis(&LID, u, v)));
-        mesh.append(handle.mesh(|u, v| mirrored(&HANDLE, u, v)));
-        mesh.append(spout.mesh(|u, v| mirrored(&SPOUT, u, v)));
+        append(&mut mesh, lid.mesh(|u, v| around_axis(&LID, u, v)));
+        append(&mut mesh, handle.mesh(|u, v| mirrored(&HANDLE, u, v)));
+        append(&mut mesh, spout.mesh(|u, v| mirrored(&SPOUT, u, v)));
+
+        // The lower end of the handle touches the body in one control point: there the body's normal
+        // counts. No triangle is lost to it.
+        let welded = weld(&mesh.positions, &mesh.triangles);
         let scale = self.height / HEIGHT;
-        for position in &mut mesh.positions {
-            *position *= scale;
+        Mesh {
+            positions: welded.positions.iter().map(|&position| scale * position).collect(),
+            normals: welded.position_sources.iter().map(|&source| mesh.normals[source as usize]).collect(),
+            triangles: welded.triangles,
+            uvs: mesh.uvs,
         }
-        // The lower end of the handle touches the body in one control point: there the body's normal counts.
-        weld(mesh).mesh
     }
+}
+
+/// Adds a part; positions that both have stay apart until they are welded.
+fn append(mesh: &mut Mesh, part: Mesh) {
+    let offset = mesh.positions.len() as u32;
+    mesh.positions.extend(part.positions);
+    mesh.normals.extend(part.normals);
+    mesh.triangles.extend(part.triangles.iter().map(|ids| ids.map(|id| id + offset)));
+    mesh.uvs.extend(part.uvs);
 }
 
 fn tube(segments: u32, rings: u32) -> Grid {
