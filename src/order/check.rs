@@ -53,7 +53,9 @@ pub struct Check {
 }
 
 impl Check {
-    fn and(mut self, other: Self) -> Self {
+    /// Both findings together.
+    #[must_use]
+    pub fn and(mut self, other: Self) -> Self {
         self.rays += other.rays;
         self.wrong_rays += other.wrong_rays;
         self.pairs += other.pairs;
