@@ -1,7 +1,25 @@
 //! Volumes: RGBA 3D textures, their files, recipes and mip pyramids.
 
+mod file;
+mod interpretation;
+mod ktx2_file;
+mod nrrd;
 mod pyramid;
+mod raw;
 pub mod recipe;
+mod sample;
+mod stack;
+mod transfer;
+
+pub use file::{info, read};
+pub use interpretation::Interpretation;
+pub use ktx2_file::{write_raw, write_volume};
+pub use raw::{AlphaMode, ChannelRange, RawVolume, VolumeInfo};
+pub use sample::Sample;
+pub use transfer::{ControlPoint, InvalidTransferFunction, TransferFunction};
+
+/// DEFLATE turns no byte into more than 1032 (a match of 258 bytes takes at least two bits).
+const MAX_DEFLATE_RATIO: usize = 1032;
 
 /// An RGBA 3D texture in texture space (u, v, w).
 ///

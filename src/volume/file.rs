@@ -1,0 +1,45 @@
+//! Volume files of any supported kind.
+
+use std::fs::File;
+use std::io::Read as _;
+use std::path::Path;
+
+use super::raw::unreadable;
+use super::{RawVolume, VolumeInfo, ktx2_file, nrrd, stack};
+use crate::{Error, Result};
+
+const PNG_MAGIC: &[u8] = b"\x89PNG\r\n\x1a\n";
+
+/// Reads a KTX2 file, an NRRD file (attached or detached header), a PNG, a folder of PNGs or a pattern of them
+/// (`slice_*.png`); files are told apart by their first bytes, not by their names.
+///
+/// # Errors
+/// [`Error::Input`] where the file is missing, damaged or of another kind, and
+/// [`Error::OutOfMemory`] where it holds more than 2^28 texels.
+pub fn read(path: &Path) -> Result<RawVolume> {
+    if path.is_dir() || stack::is_pattern(path) {
+        return stack::read(path);
+    }
+    let mut magic = Vec::new();
+    File::open(path)
+        .and_then(|file| file.take(ktx2::MAGIC.len() as u64).read_to_end(&mut magic))
+        .map_err(|error| unreadable(path, &error))?;
+    if magic == ktx2::MAGIC {
+        ktx2_file::read(path)
+    } else if magic.starts_with(nrrd::MAGIC) {
+        nrrd::read(path)
+    } else if magic.starts_with(PNG_MAGIC) {
+        stack::read(path)
+    } else {
+        let error = Error::input(path, "is no volume: it does not begin as a KTX2, NRRD or PNG file does");
+        Err(error.with_help("read a 3D KTX2 texture, an NRRD file, or a folder or pattern of PNG slices"))
+    }
+}
+
+/// What the volume at `path` is, read whole, so that its ranges are known.
+///
+/// # Errors
+/// As [`read`].
+pub fn info(path: &Path) -> Result<VolumeInfo> {
+    Ok(read(path)?.info())
+}

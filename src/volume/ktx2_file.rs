@@ -1,0 +1,310 @@
+//! 3D textures in KTX2 files (Khronos, "KTX File Format Specification", version 2.0).
+//!
+//! Read are level 0 of the 3D formats that [`Sample`] lists, as they are or compressed with zlib. The
+//! axes are taken as stored: texel (0, 0, 0) comes first, and x, y, z become u, v, w.
+
+use std::fs::File;
+use std::io::{Read as _, Write as _};
+use std::path::Path;
+
+use flate2::read::ZlibDecoder;
+use ktx2::dfd::{Basic, Block};
+use ktx2::{Header, Index, LevelIndex, SupercompressionScheme};
+
+use super::raw::{check_fits_memory, claimed_size, file_bytes};
+use super::{AlphaMode, MAX_DEFLATE_RATIO, RawVolume, Sample, Volume};
+use crate::{Error, Result};
+
+/// Reads level 0 of the 3D texture at `path`.
+pub(super) fn read(path: &Path) -> Result<RawVolume> {
+    let bytes = file_bytes(path)?;
+    let short = || Error::input(path, format!("ends early: it has only {} bytes", bytes.len()));
+    let header = bytes.first_chunk::<{ Header::LENGTH }>().ok_or_else(short)?;
+    let header = Header::from_bytes(header).map_err(|error| Error::input(path, format!("has {error}")))?;
+    let Header { pixel_width, pixel_height, pixel_depth, .. } = header;
+    if pixel_depth == 0 || header.layer_count > 1 || header.face_count != 1 {
+        return Err(Error::input(path, "is no 3D texture: its pixelDepth is 0, or it has layers or faces"));
+    }
+    let (sample, channels) = header.format.and_then(Sample::of).ok_or_else(|| {
+        let name = header.format.map_or("VK_FORMAT_UNDEFINED".into(), |format| format!("{format:?}"));
+        Error::input(path, format!("has the format {name}, which is not supported")).with_help(
+            "supported are 1 to 4 channels of UNORM and SRGB in 8 bits, UNORM in 16, SFLOAT in 16 and 32",
+        )
+    })?;
+    let size = [pixel_width, pixel_height, pixel_depth].map(u64::from);
+    let (size, count) = claimed_size(path, size, channels)?;
+    let stored = level_0(&bytes).ok_or_else(short)?;
+    let byte_count = count * sample.bytes();
+    let wrong_length = |found: usize| {
+        let [width, height, depth] = size;
+        let message = format!(
+            "level 0 of {width} x {height} x {depth} texels takes {byte_count} bytes, but has {found}"
+        );
+        Error::input(path, message)
+    };
+    let values = match header.supercompression_scheme {
+        None if stored.len() == byte_count => {
+            check_fits_memory(path, size)?;
+            sample.decode(stored, channels)
+        }
+        None => return Err(wrong_length(stored.len())),
+        Some(SupercompressionScheme::ZLIB) => {
+            if byte_count / MAX_DEFLATE_RATIO > stored.len() {
+                return Err(wrong_length(stored.len()));
+            }
+            check_fits_memory(path, size)?;
+            let mut inflated = Vec::new();
+            ZlibDecoder::new(stored)
+                .take(byte_count as u64 + 1)
+                .read_to_end(&mut inflated)
+                .map_err(|error| Error::input(path, format!("its zlib data is damaged: {error}")))?;
+            if inflated.len() != byte_count {
+                return Err(wrong_length(inflated.len()));
+            }
+            sample.decode(&inflated, channels)
+        }
+        Some(scheme) => {
+            let error =
+                Error::input(path, format!("is supercompressed by {scheme:?}, which is not supported"));
+            return Err(error.with_help("store it without supercompression, or with zlib"));
+        }
+    };
+    let format = format!("KTX2 {:?}", sample.format(channels));
+    let alpha_mode =
+        if is_premultiplied(&bytes, &header.index) { AlphaMode::Premultiplied } else { AlphaMode::Straight };
+    RawVolume { path: path.into(), format, size, channels, values, full_scale: 1.0, alpha_mode }.validated()
+}
+
+/// The stored bytes of level 0; `None` where they lie beyond the end.
+fn level_0(bytes: &[u8]) -> Option<&[u8]> {
+    let index = bytes.get(Header::LENGTH..)?.first_chunk::<{ LevelIndex::LENGTH }>()?;
+    let level = LevelIndex::from_bytes(index);
+    let start = usize::try_from(level.byte_offset).ok()?;
+    let end = start.checked_add(usize::try_from(level.byte_length).ok()?)?;
+    bytes.get(start..end)
+}
+
+/// Whether the data format descriptor has the flag `KHR_DF_FLAG_ALPHA_PREMULTIPLIED`.
+///
+/// Its byte is read in place: `ktx2` 0.5 panics at a descriptor with texel blocks of 256 texels.
+fn is_premultiplied(bytes: &[u8], index: &Index) -> bool {
+    const FLAGS: usize = size_of::<u32>() + ktx2::dfd::BlockHeader::LENGTH + 3;
+    let flags = bytes.get((index.dfd_byte_offset as usize).saturating_add(FLAGS));
+    index.dfd_byte_length as usize > FLAGS && flags.is_some_and(|flags| flags & 1 == 1)
+}
+
+/// Writes `volume` as premultiplied R32G32B32A32_SFLOAT; it is read back bit for bit.
+///
+/// The file is written beside `path` and renamed, so that `path` is never half a file.
+///
+/// # Errors
+/// [`Error::Output`] where the file cannot be written.
+pub fn write_volume(path: &Path, volume: &Volume) -> Result<()> {
+    let texels = Sample::Float32.encode(volume.texels.iter().flatten().copied(), 4);
+    write_texture(path, volume.size, Sample::Float32, 4, AlphaMode::Premultiplied, &texels)
+}
+
+/// Writes the values of `raw` in `sample` format, beside `path` and then renamed.
+///
+/// Colours and opacities, and scalars too where the format is normalised, are divided by
+/// [`RawVolume::full_scale`].
+///
+/// # Errors
+/// [`Error::Usage`] where the format cannot hold a value, [`Error::Output`] where the file cannot be written.
+pub fn write_raw(path: &Path, raw: &RawVolume, sample: Sample) -> Result<()> {
+    let normalised = matches!(sample, Sample::Unorm8 | Sample::Srgb8 | Sample::Unorm16);
+    let scale = if raw.channels > 1 || normalised { raw.full_scale } else { 1.0 };
+    let scaled = || raw.values.iter().map(|value| value / scale);
+    if let Some(value) = scaled().find(|&value| !sample.can_store(value)) {
+        let message = format!("{}: {sample:?} cannot hold the value {value}", raw.path.display());
+        return Err(Error::Usage { message, help: Some("store it as 32-bit floats".into()) });
+    }
+    let texels = sample.encode(scaled(), raw.channels);
+    write_texture(path, raw.size, sample, raw.channels, raw.alpha_mode, &texels)
+}
+
+fn write_texture(
+    path: &Path,
+    size: [u32; 3],
+    sample: Sample,
+    channels: u32,
+    alpha_mode: AlphaMode,
+    texels: &[u8],
+) -> Result<()> {
+    let failed = |error: std::io::Error| Error::Output {
+        path: path.into(),
+        message: format!("cannot be written: {error}"),
+        help: None,
+    };
+    let prologue = prologue(size, sample, channels, alpha_mode, texels.len());
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    // A file made by `create_new`, unlike a temporary file, has the permissions that the user's files have.
+    let mut beside = tempfile::Builder::new()
+        .suffix(".partial")
+        .make_in(folder, |path| File::options().write(true).create_new(true).open(path))
+        .map_err(failed)?;
+    beside.write_all(&prologue).and_then(|()| beside.write_all(texels)).map_err(failed)?;
+    beside.persist(path).map_err(|error| failed(error.error))?;
+    Ok(())
+}
+
+/// All that comes before the texels: header, level index, data format descriptor, key/value data, padding.
+fn prologue(
+    size: [u32; 3],
+    sample: Sample,
+    channels: u32,
+    alpha_mode: AlphaMode,
+    byte_count: usize,
+) -> Vec<u8> {
+    let format = sample.format(channels);
+    let premultiplied = alpha_mode == AlphaMode::Premultiplied;
+    let (basic, type_size) = Basic::from_format_with(format, premultiplied, None, None, None)
+        .expect("every format of a Sample has a descriptor");
+    let block = Block::Basic(basic).to_vec();
+    let descriptor = [&(block.len() as u32 + 4).to_le_bytes(), block.as_slice()].concat();
+    // Keys in the order of their bytes, as the specification asks for.
+    let mut metadata = Vec::new();
+    if channels == 2 {
+        metadata.extend(key_value(b"KTXswizzle\0rrrg\0"));
+    }
+    metadata.extend(key_value(b"KTXwriter\0mesoshell\0"));
+
+    let descriptor_start = Header::LENGTH + LevelIndex::LENGTH;
+    let metadata_start = descriptor_start + descriptor.len();
+    // Texels are aligned to the least common multiple of 4 and their size; 48 serves 1 to 16 bytes of them.
+    let texels_start = (metadata_start + metadata.len()).next_multiple_of(48);
+    let header = Header {
+        format: Some(format),
+        type_size,
+        pixel_width: size[0],
+        pixel_height: size[1],
+        pixel_depth: size[2],
+        layer_count: 0,
+        face_count: 1,
+        level_count: 1,
+        supercompression_scheme: None,
+        index: Index {
+            dfd_byte_offset: descriptor_start as u32,
+            dfd_byte_length: descriptor.len() as u32,
+            kvd_byte_offset: metadata_start as u32,
+            kvd_byte_length: metadata.len() as u32,
+            sgd_byte_offset: 0,
+            sgd_byte_length: 0,
+        },
+    };
+    let level = LevelIndex {
+        byte_offset: texels_start as u64,
+        byte_length: byte_count as u64,
+        uncompressed_byte_length: byte_count as u64,
+    };
+    let mut prologue = [&header.as_bytes()[..], &level.as_bytes(), &descriptor, &metadata].concat();
+    prologue.resize(texels_start, 0);
+    prologue
+}
+
+/// A key and its value, both ended by NUL, with length and padding.
+fn key_value(pair: &[u8]) -> Vec<u8> {
+    let mut entry = [&(pair.len() as u32).to_le_bytes(), pair].concat();
+    entry.resize(entry.len().next_multiple_of(4), 0);
+    entry
+}
+
+#[cfg(test)]
+mod tests {
+    use flate2::Compression;
+    use flate2::read::ZlibEncoder;
+
+    use super::*;
+    use crate::volume::Interpretation;
+
+    fn raw(sample: Sample, channels: u32) -> RawVolume {
+        let size = [3, 2, 5];
+        let words: Vec<u8> =
+            (0..30 * channels).flat_map(|i| ((i * 97 % 256) as f32 / 255.0).to_le_bytes()).collect();
+        let values = match sample {
+            Sample::Float32 => sample.decode(&words, channels),
+            _ => {
+                let values = Sample::Float32.decode(&words, channels);
+                sample.decode(&sample.encode(values.into_iter(), channels), channels)
+            }
+        };
+        let alpha_mode = if channels == 4 { AlphaMode::Premultiplied } else { AlphaMode::Straight };
+        let format = format!("KTX2 {:?}", sample.format(channels));
+        RawVolume { path: "".into(), format, size, channels, values, full_scale: 1.0, alpha_mode }
+    }
+
+    #[test]
+    fn what_is_written_is_read_bit_for_bit_here_and_by_the_ktx2_crate() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("round trip.ktx2");
+        for sample in [Sample::Unorm8, Sample::Srgb8, Sample::Unorm16, Sample::Float16, Sample::Float32] {
+            for channels in 1..=4 {
+                let written = RawVolume { path: path.clone(), ..raw(sample, channels) };
+                write_raw(&path, &written, sample).unwrap();
+                assert_eq!(read(&path).unwrap(), written);
+
+                let reader = ktx2::Reader::new(std::fs::read(&path).unwrap()).unwrap();
+                let header = reader.header();
+                assert_eq!(header.format, Some(sample.format(channels)));
+                assert_eq!([header.pixel_width, header.pixel_height, header.pixel_depth], written.size);
+                assert_eq!(header.type_size as usize, sample.bytes());
+                assert_eq!(reader.writer(), Some("mesoshell\0"));
+                assert_eq!(reader.is_alpha_premultiplied(), Some(channels == 4));
+                let level = reader.levels().next().unwrap();
+                assert_eq!(level.data, sample.encode(written.values.iter().copied(), channels));
+                let offset = level.data.as_ptr() as usize - reader.data().as_ptr() as usize;
+                assert_eq!((offset % 4, offset % (sample.bytes() * channels as usize)), (0, 0));
+            }
+        }
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1, "no partial file is left");
+    }
+
+    #[test]
+    fn a_volume_survives_bit_for_bit() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("v.ktx2");
+        let texels = (0..24).map(|i| [i as f32 / 7.0, 1e-40, 0.0, i as f32 / 23.0]).collect();
+        let volume = Volume::new([2, 3, 4], texels).unwrap();
+        write_volume(&path, &volume).unwrap();
+        assert_eq!(Volume::from_raw(read(&path).unwrap(), &Interpretation::default()).unwrap(), volume);
+    }
+
+    #[test]
+    fn values_that_do_not_fit_are_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("v.ktx2");
+        let mut hot = raw(Sample::Float32, 1);
+        hot.values[4] = 1e5;
+        write_raw(&path, &hot, Sample::Float32).unwrap();
+        for sample in [Sample::Float16, Sample::Unorm8] {
+            assert!(write_raw(&path, &hot, sample).unwrap_err().to_string().contains("100000"));
+        }
+        hot.full_scale = 1e5;
+        write_raw(&path, &hot, Sample::Unorm8).unwrap();
+    }
+
+    #[test]
+    fn zlib_is_inflated_and_bounded() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("z.ktx2");
+        let plain = RawVolume { path: path.clone(), ..raw(Sample::Float32, 4) };
+        write_raw(&path, &plain, Sample::Float32).unwrap();
+        let bytes = std::fs::read(&path).unwrap();
+        let start = bytes.len() - 480;
+        let with_level = |texels: &[u8]| {
+            let mut level = Vec::new();
+            ZlibEncoder::new(texels, Compression::best()).read_to_end(&mut level).unwrap();
+            let mut file = bytes[..start].to_vec();
+            file[44] = 3;
+            file[88..96].copy_from_slice(&(level.len() as u64).to_le_bytes());
+            file.extend(level);
+            std::fs::write(&path, file).unwrap();
+            read(&path)
+        };
+        assert_eq!(with_level(&bytes[start..]).unwrap(), plain);
+        for length in [479, 481, 10_000_000] {
+            let message = with_level(&vec![0; length]).unwrap_err().to_string();
+            assert!(message.contains("takes 480 bytes, but has"), "{message}");
+        }
+    }
+}
