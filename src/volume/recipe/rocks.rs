@@ -34,15 +34,15 @@ keys! {
         /// Height of the ground as a share of the shell's thickness.
         ground: f32 = 0.2, 0.0..=0.9;
         /// How dark it is between the stones.
-        occlusion: f32 = 0.8, 0.0..=1.0;
+        occlusion: f32 = 0.9, 0.0..=1.0;
         /// How much the stones are mottled.
-        mottling: f32 = 0.5, 0.0..=1.0;
+        mottling: f32 = 0.6, 0.0..=1.0;
         /// Colours of the stones run from this one
         light_colour: Colour = srgb(0xb9b2a4);
         /// to this one.
         dark_colour: Colour = srgb(0x6f675f);
         /// The colour of some of the stones.
-        accent_colour: Colour = srgb(0xa07a58);
+        accent_colour: Colour = srgb(0x96785e);
         /// Colour of the ground.
         ground_colour: Colour = srgb(0x4b3d2e);
     }
@@ -109,8 +109,23 @@ impl Rocks {
         Stone { centre: place.extend(sunk), radius, turn: turn.inverse(), shape, facets, colour }
     }
 
-    /// Draws the part of a stone that crosses the slice at height `z`, where it is nearer than what `depth`
-    /// (distances to the surfaces drawn so far) holds.
+    fn draw_ground(&self, grid: &Grid, k: usize, seed: u32, slice: &mut [[f32; 4]]) {
+        let relief = 0.1 * grid.height;
+        let above = grid.position(0, 0, k).z - self.ground * grid.height;
+        if above > 1.04 * relief + grid.voxel() {
+            return;
+        }
+        let soil = Octaves { cells: 10, count: 4, gain: 0.6, finest: grid.finest_noise() };
+        let light = 1. - 0.7 * self.occlusion;
+        for (index, texel) in slice.iter_mut().enumerate() {
+            let position = grid.position(index % grid.size[0], index / grid.size[0], k);
+            let noise = soil.gradient(position, seed ^ 0x77);
+            let colour = self.ground_colour.0 * light * (1. + noise);
+            lay_over(texel, colour, grid.coverage(above - relief * noise));
+        }
+    }
+
+    /// Draws the part of a stone that crosses the slice at height `z`.
     fn draw_stone(&self, stone: &Stone, grid: &Grid, z: f32, seed: u32, slice: &mut [[f32; 4]]) {
         let reach = stone.radius * (1. + self.roughness) + grid.voxel();
         if (z - stone.centre.z).abs() > reach {
@@ -168,20 +183,9 @@ impl Stone {
 impl Pattern for Rocks {
     fn draw(&self, grid: &Grid, seed: u32, texels: &mut [[f32; 4]]) {
         let stones = self.stones(grid.height, seed);
-        let soil = Octaves { cells: 10, count: 4, gain: 0.6, finest: grid.finest_noise() };
         grid.slices(texels, |k, slice| {
-            for (index, texel) in slice.iter_mut().enumerate() {
-                let position = grid.position(index % grid.size[0], index / grid.size[0], k);
-                let surface = grid.height * self.ground;
-                if position.z > surface + 0.1 * grid.height {
-                    break;
-                }
-                let noise = soil.gradient(position, seed ^ 0x77);
-                let alpha = grid.coverage(position.z - surface - 0.1 * grid.height * noise);
-                let light = 1. - 0.7 * self.occlusion;
-                lay_over(texel, self.ground_colour.0 * light * (1. + noise), alpha);
-            }
             let z = grid.position(0, 0, k).z;
+            self.draw_ground(grid, k, seed, slice);
             for stone in &stones {
                 self.draw_stone(stone, grid, z, seed, slice);
             }
