@@ -58,14 +58,15 @@ impl Vapour {
 impl Clouds {
     fn vapour(&self, grid: &Grid, position: Vec3, seed: u32) -> Vapour {
         // Nothing reaches the outer surface, and clouds are widest low down.
-        let level = (position.z / grid.height - self.bottom) / (0.97 - self.bottom);
+        let level = (position.z / grid.height - self.bottom) / (0.95 - self.bottom);
         let profile = smoothstep(0., 0.2, level) * (1. - level.clamp(0., 1.).powi(2));
         if profile <= 0. || self.coverage <= 0. {
             return Vapour::NONE;
         }
         let finest = grid.finest_noise();
         let shape = Octaves { cells: self.scale, count: self.octaves, gain: 0.45, finest };
-        let body = 1.6 * shape.gradient(position, seed) + self.coverage - 0.5 - 0.7 * (1. - profile);
+        let body = 1.6 * shape.gradient(position, seed) + self.coverage - 0.5;
+        let body = body - 0.7 * (1. - profile) - smoothstep(0.6, 1., level);
         // The billows add and take at most this much.
         let billowing = 0.9 * self.billowing;
         if body + 0.5 * billowing <= 0. {
@@ -93,6 +94,7 @@ impl Pattern for Clouds {
             let Vapour { density, level, bulge } = self.vapour(grid, position, seed);
             [density, level, bulge, 0.]
         });
+        grid.soften(texels);
 
         // From the top slice down, `above` is the optical depth over each column.
         let slice_texels = grid.size[0] * grid.size[1];

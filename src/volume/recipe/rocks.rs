@@ -30,7 +30,7 @@ keys! {
         /// How angular the stones are: 0 is smooth.
         angularity: f32 = 0.5, 0.0..=1.0;
         /// Depth of the bumps as a share of a stone's radius.
-        roughness: f32 = 0.12, 0.0..=0.5;
+        roughness: f32 = 0.1, 0.0..=0.5;
         /// Height of the ground as a share of the shell's thickness.
         ground: f32 = 0.2, 0.0..=0.9;
         /// How dark it is between the stones.
@@ -127,11 +127,11 @@ impl Rocks {
 
     /// Draws the part of a stone that crosses the slice at height `z`.
     fn draw_stone(&self, stone: &Stone, grid: &Grid, z: f32, seed: u32, slice: &mut [[f32; 4]]) {
-        let reach = stone.radius * (1. + self.roughness) + grid.voxel();
+        let reach = stone.radius * (1. + 1.7 * self.roughness) + 1.25 * grid.voxel();
         if (z - stone.centre.z).abs() > reach {
             return;
         }
-        let bumps = Octaves { cells: 12, count: 4, gain: 0.55, finest: grid.finest_noise() };
+        let bumps = Octaves { cells: 12, count: 4, gain: 0.4, finest: grid.finest_noise() };
         let mottles = Octaves { cells: 9, count: 5, gain: 0.75, finest: grid.finest_noise() };
         for (j, y) in grid.between(1, stone.centre.y - reach, stone.centre.y + reach) {
             for (i, x) in grid.between(0, stone.centre.x - reach, stone.centre.x + reach) {
@@ -141,11 +141,12 @@ impl Rocks {
                     continue;
                 }
                 let smooth = stone.distance(from_centre);
-                if smooth > grid.voxel() + self.roughness * stone.radius {
+                if smooth > 1.25 * grid.voxel() + 1.7 * self.roughness * stone.radius {
                     continue;
                 }
                 let bump = bumps.gradient(position, seed) * self.roughness * stone.radius * 1.6;
-                let alpha = grid.coverage(smooth - bump);
+                // The bumps make the estimate of the distance up to a fifth too steep.
+                let alpha = grid.coverage(0.8 * (smooth - bump));
                 if alpha > 0. {
                     let mottle = 1. + 1.6 * self.mottling * mottles.gradient(position, seed ^ 0x3d);
                     let colour = stone.colour * mottle * self.light(grid, z, from_centre.z / stone.shape.z);
