@@ -1,2 +1,7 @@
 //! The command line: see `mesoshell --help`.
-fn main() {}
+
+mod cli;
+
+fn main() -> std::process::ExitCode {
+    cli::run()
+}

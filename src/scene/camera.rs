@@ -8,6 +8,12 @@
 
 use glam::{DVec2, DVec3};
 
+/// The vertical field of view where nothing else is said, in degrees.
+pub const DEFAULT_FOV_DEGREES: f64 = 40.0;
+
+/// [`Camera::near`] where nothing else is said, as a part of the distance between eye and target.
+pub const DEFAULT_NEAR: f64 = 1e-3;
+
 /// A pinhole camera in world space.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Camera {
@@ -48,6 +54,22 @@ pub struct View {
 }
 
 impl Camera {
+    /// A camera with a field of view of 40 degrees that sees all of `points` (world space), from the
+    /// front, a little to the right and above.
+    pub fn framing(points: &[DVec3]) -> Self {
+        let (low, high) = points
+            .iter()
+            .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), &p| (low.min(p), high.max(p)));
+        let target = if points.is_empty() { DVec3::ZERO } else { 0.5 * (low + high) };
+        let radius = points.iter().map(|p| p.distance(target)).fold(0.0, f64::max);
+        let radius = if radius > 0.0 { radius } else { 1.0 };
+        let fov_y = DEFAULT_FOV_DEGREES.to_radians();
+        // The sphere around the points touches the picture's upper and lower edge.
+        let distance = radius / (0.5 * fov_y).sin();
+        let eye = target + distance * DVec3::new(0.4, 0.5, 1.0).normalize();
+        Self { eye, target, up: DVec3::Y, fov_y, near: DEFAULT_NEAR * distance }
+    }
+
     /// The camera's axes.
     pub fn frame(&self) -> CameraFrame {
         let forward = (self.target - self.eye).normalize();
@@ -70,5 +92,36 @@ impl View {
         let half = 0.5 * DVec2::new(f64::from(self.width), f64::from(self.height));
         let offset = (point - half) * self.pixel_at_unit_depth();
         frame.forward + offset.x * frame.right - offset.y * frame.up
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn framing_takes_in_every_point() {
+        let points: Vec<_> = (0..8)
+            .map(|i| DVec3::new(f64::from(i & 1), f64::from(i >> 1 & 1) * 5.0, f64::from(i >> 2)) + 100.0)
+            .collect();
+        let camera = Camera::framing(&points);
+        let frame = camera.frame();
+        let seen = |p: DVec3, tangent: f64| {
+            let p = p - camera.eye;
+            let depth = p.dot(frame.forward);
+            depth > camera.near && p.dot(frame.up).hypot(p.dot(frame.right)) <= depth * tangent
+        };
+        let tangent = (0.5 * camera.fov_y).tan();
+        assert!(points.iter().all(|&p| seen(p, tangent * (1.0 + 1e-12))));
+        assert!(!points.iter().all(|&p| seen(p, 0.5 * tangent)), "a narrower picture cuts the points");
+    }
+
+    #[test]
+    fn the_ray_through_the_middle_goes_forward() {
+        let camera = Camera::framing(&[DVec3::ZERO, DVec3::ONE]);
+        let view = View { camera, width: 7, height: 4, depth: false };
+        assert_eq!(view.ray_at_unit_depth(DVec2::new(3.5, 2.0)), camera.frame().forward);
+        let up_left = view.ray_at_unit_depth(DVec2::ZERO) - camera.frame().forward;
+        assert!(up_left.dot(camera.frame().up) > 0.0 && up_left.dot(camera.frame().right) < 0.0);
     }
 }

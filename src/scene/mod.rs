@@ -1,8 +1,13 @@
 //! The scene: what is rendered, from where, and how finely.
 
 pub mod camera;
+pub mod file;
+pub mod load;
+mod number;
+mod text;
 
 pub use camera::{Camera, View};
+pub use load::{Loaded, load, parse};
 
 use crate::shell::Shell;
 use crate::volume::Pyramid;
@@ -51,7 +56,27 @@ pub enum March {
     },
 }
 
+impl Default for March {
+    /// Two samples a texel.
+    fn default() -> Self {
+        Self::Default { step: 0.5 }
+    }
+}
+
 impl Scene {
+    /// A shell filled with a texture, whose opacity is that of a path of `opacity_distance` world units: all of
+    /// it in a picture of 512 x 512 pixels, at the default level of detail and step.
+    pub fn new(shell: Shell, volume: Pyramid, opacity_distance: f64) -> Self {
+        let camera = Camera::framing(&shell.vertices);
+        Self {
+            shell,
+            volume,
+            medium: Medium { opacity_distance, lod_footprint: 1.0 },
+            view: View { camera, width: 512, height: 512, depth: false },
+            march: March::default(),
+        }
+    }
+
     /// The largest density of level-0 texels along any texture axis in a tetrahedron, in texels per
     /// world unit: `max_i size_i |row_i of texture_from_world|`.
     pub fn texels_per_unit(&self, tetrahedron: usize) -> f64 {

@@ -1,0 +1,19 @@
+# make demo renders the first picture, make test runs every test; both first install what the machine lacks.
+
+CARGO ?= cargo
+
+.PHONY: demo test setup setup-test
+
+demo: setup
+	$(CARGO) build --release
+	target/release/mesoshell render scenes/fur-sphere.toml -o out/fur-sphere.png
+	@echo "the picture is in out/fur-sphere.png"
+
+test: setup-test
+	$(CARGO) test --release
+
+setup:
+	@CARGO="$(CARGO)" .ci/setup
+
+setup-test:
+	@CARGO="$(CARGO)" .ci/setup test

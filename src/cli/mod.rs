@@ -1,0 +1,93 @@
+//! The command line: what it accepts, what it prints, and with which exit code it ends. One file a subcommand.
+//!
+//! Standard output carries the result alone, standard error progress, warnings and errors.
+
+mod devices;
+mod diff;
+mod mesh;
+mod output;
+mod progress;
+mod render;
+mod volume;
+
+use std::io::IsTerminal;
+use std::process::ExitCode;
+
+use clap::{Args, Parser, Subcommand};
+
+const EXIT_CODES: &str = "\
+Exit codes:
+  0    done
+  1    diff: the images differ by more than --max-rmse
+  2    the request makes no sense (an unknown option, a bad -D)
+  3    an input file is missing, damaged or means something impossible
+  4    no usable Vulkan device
+  5    out of memory, the machine's or the device's
+  6    a result cannot be written
+  130  interrupted";
+
+/// Renders semi-transparent 3D textures mapped into a shell around a triangle mesh.
+#[derive(Parser)]
+#[command(version, after_help = EXIT_CODES)]
+struct Cli {
+    #[command(flatten)]
+    talk: Talk,
+    #[command(subcommand)]
+    command: Command,
+}
+
+/// How results and progress are told.
+#[derive(Args, Clone, Copy)]
+struct Talk {
+    /// Print the result as JSON
+    #[arg(long, global = true)]
+    json: bool,
+    /// Print nothing but errors
+    #[arg(long, short, global = true)]
+    quiet: bool,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    Render(render::Arguments),
+    Devices(devices::Arguments),
+    /// Tell about meshes
+    #[command(subcommand)]
+    Mesh(mesh::Command),
+    /// Tell about volumes
+    #[command(subcommand)]
+    Volume(volume::Command),
+    Diff(diff::Arguments),
+}
+
+/// Runs what the arguments of this process ask for.
+pub fn run() -> ExitCode {
+    // Lines are wrapped for a terminal alone: a path in a log file stays in one piece.
+    let wrap = std::io::stderr().is_terminal();
+    let handler = move |_: &_| -> Box<dyn miette::ReportHandler> {
+        Box::new(miette::MietteHandlerOpts::new().wrap_lines(wrap).break_words(false).build())
+    };
+    miette::set_hook(Box::new(handler)).expect("no other hook has been set");
+
+    let Cli { talk, command } = Cli::parse();
+    let done = match command {
+        Command::Render(arguments) => render::run(arguments, talk).map(|()| ExitCode::SUCCESS),
+        Command::Devices(arguments) => devices::run(arguments, talk).map(|()| ExitCode::SUCCESS),
+        Command::Mesh(command) => mesh::run(command, talk).map(|()| ExitCode::SUCCESS),
+        Command::Volume(command) => volume::run(command, talk).map(|()| ExitCode::SUCCESS),
+        Command::Diff(arguments) => diff::run(arguments, talk),
+    };
+    done.unwrap_or_else(|error| {
+        let code = error.exit_code();
+        output::complain(&format!("{:?}", miette::Report::new(error)));
+        code.into()
+    })
+}
+
+/// A table of names and values, the values aligned.
+fn table<'a>(rows: impl IntoIterator<Item = (&'a str, String)>) -> String {
+    let rows: Vec<_> = rows.into_iter().collect();
+    let width = rows.iter().map(|(name, _)| name.len()).max().unwrap_or(0);
+    let lines = rows.iter().map(|(name, value)| format!("  {name:width$}  {value}\n"));
+    lines.collect()
+}

@@ -1,0 +1,70 @@
+//! Progress on standard error: one line that is drawn over on a terminal, else one line a finished stage.
+
+use std::io::{IsTerminal, stderr};
+use std::sync::{Mutex, PoisonError};
+use std::time::Instant;
+
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use mesoshell::progress::Progress;
+
+use super::{Talk, output};
+
+/// Steps of the bar.
+const STEPS: u64 = 1000;
+
+/// Shows stages and their times. The line is wiped when it goes.
+pub struct Line {
+    bar: ProgressBar,
+    prints_stages: bool,
+    current: Mutex<Option<(String, Instant)>>,
+}
+
+impl Line {
+    /// Draws on a terminal, prints elsewhere, and does neither where the user wants quiet.
+    pub fn new(talk: Talk) -> Self {
+        let is_terminal = stderr().is_terminal();
+        let target = match talk.quiet || !is_terminal {
+            true => ProgressDrawTarget::hidden(),
+            false => ProgressDrawTarget::stderr(),
+        };
+        let bar = ProgressBar::with_draw_target(Some(STEPS), target);
+        // The template is constant; the default style serves if it should ever be wrong.
+        if let Ok(style) = ProgressStyle::with_template("{prefix:.dim} {msg} {bar:24} {elapsed}") {
+            bar.set_style(style);
+        }
+        Self { bar, prints_stages: !is_terminal && !talk.quiet, current: Mutex::new(None) }
+    }
+
+    /// Ends the current stage, if there is one, and begins the next.
+    fn turn_to(&self, next: Option<&str>) {
+        let now = Instant::now();
+        let mut current = self.current.lock().unwrap_or_else(PoisonError::into_inner);
+        let next = next.map(|name| (name.to_owned(), now));
+        let Some((name, start)) = std::mem::replace(&mut *current, next) else { return };
+        let finished = format!("{name}: {:.1} ms", 1e3 * (now - start).as_secs_f64());
+        self.bar.set_prefix(format!("{finished} >"));
+        if self.prints_stages {
+            output::complain(&finished);
+        }
+    }
+}
+
+impl Progress for Line {
+    fn stage(&self, name: &str) {
+        self.turn_to(Some(name));
+        self.bar.reset_elapsed();
+        self.bar.set_message(name.to_owned());
+        self.bar.set_position(0);
+    }
+
+    fn fraction(&self, done: f64) {
+        self.bar.set_position((done.clamp(0.0, 1.0) * STEPS as f64) as u64);
+    }
+}
+
+impl Drop for Line {
+    fn drop(&mut self) {
+        self.turn_to(None);
+        self.bar.finish_and_clear();
+    }
+}

@@ -1,0 +1,154 @@
+//! `mesoshell render`: from a scene file to a picture.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use clap::Args;
+use clap::builder::{PossibleValue, PossibleValuesParser};
+use mesoshell::frame::{Image, Report, Stage, Stopwatch, file};
+use mesoshell::gpu::{DeviceChoice, Messages};
+use mesoshell::method::{self, METHODS, Setup};
+use mesoshell::progress::{Interrupt, Progress};
+use mesoshell::scene::{self, Loaded, View};
+use mesoshell::{Error, Result};
+use serde::Serialize;
+
+use super::progress::Line;
+use super::{Talk, table};
+
+/// Render a scene to a picture
+#[derive(Args)]
+pub struct Arguments {
+    /// The scene file; docs/scene.md lists its keys
+    scene: PathBuf,
+    /// The picture: .png (sRGB, 8 bits) or .exr (linear, float); by default the scene's name with .png, in the
+    /// working directory
+    #[arg(short, long, value_name = "FILE")]
+    output: Option<PathBuf>,
+    /// Width and height in pixels, instead of the scene's
+    #[arg(long, value_name = "WxH", value_parser = size)]
+    size: Option<[u32; 2]>,
+    /// How the scene is rendered
+    #[arg(long, default_value = METHODS[0].name, value_parser = methods())]
+    method: String,
+    /// Set a key of the scene: -D shell.thickness=0.2; may be given more than once
+    #[arg(short = 'D', value_name = "KEY=VALUE")]
+    define: Vec<String>,
+    /// The device: its number in `mesoshell devices`, a part of its name, or its UUID
+    #[arg(long)]
+    device: Option<DeviceChoice>,
+    /// Let the Vulkan validation layers watch; what they find is an error
+    #[arg(long)]
+    validate: bool,
+}
+
+/// What is printed with `--json`.
+#[derive(Serialize)]
+struct Rendered {
+    scene: PathBuf,
+    output: PathBuf,
+    width: u32,
+    height: u32,
+    /// Its stages are those of the load, of the method's preparation, of the frame, and of writing.
+    report: Report,
+}
+
+/// # Errors
+/// Whatever stands between the scene and its picture.
+pub fn run(arguments: Arguments, talk: Talk) -> Result<()> {
+    let interrupt = Interrupt::default();
+    listen(&interrupt);
+    let progress: Arc<dyn Progress> = Arc::new(Line::new(talk));
+    let rendered = render(&arguments, &progress, &interrupt);
+    drop(progress); // The progress line is wiped before anything else is said.
+    let rendered = rendered?;
+    for warning in &rendered.report.warnings {
+        talk.warn(warning);
+    }
+    talk.result(&rendered, || {
+        let Rendered { output, width, height, report, .. } = &rendered;
+        let time = |stage: &Stage| format!("{:9.2} ms", stage.milliseconds);
+        let stages = table(report.stages.iter().map(|stage| (stage.name.as_str(), time(stage))));
+        format!("{}\n{} on {}, {width}x{height}\n{stages}", output.display(), report.method, report.device)
+    })
+}
+
+fn render(arguments: &Arguments, progress: &Arc<dyn Progress>, interrupt: &Interrupt) -> Result<Rendered> {
+    let scene = &arguments.scene;
+    let output = arguments.output.clone().unwrap_or_else(|| {
+        PathBuf::from(scene.file_stem().unwrap_or(scene.as_os_str())).with_added_extension("png")
+    });
+    file::check_writable(&output)?;
+
+    let mut overrides = arguments.define.clone();
+    overrides.extend(arguments.size.map(|[width, height]| format!("image.size=[{width}, {height}]")));
+    let Loaded { scene: loaded, background, mut stages } = scene::load(scene, &overrides, progress.as_ref())?;
+    interrupt.check()?;
+
+    let view = loaded.view;
+    let device = arguments.device.clone().unwrap_or_default();
+    let messages = arguments.validate.then(Messages::default);
+    let setup = Setup { device: &device, validation: messages.as_ref(), progress, interrupt };
+    let mut watch = Stopwatch::start();
+    let method = method::by_name(&arguments.method).expect("clap lets through the names of the table alone");
+    let mut method = (method.prepare)(Arc::new(loaded), &setup)?;
+    watch.lap("prepare");
+    stages.extend(watch.finish());
+
+    let mut frame = method.render(&view)?;
+    drop(method);
+    let messages = messages.map_or_else(Vec::new, |messages| messages.all());
+    if !messages.is_empty() {
+        return Err(Error::Device {
+            message: format!("the validation layers object:\n{}", messages.join("\n")),
+            help: None,
+        });
+    }
+
+    progress.stage("writing the picture");
+    let mut watch = Stopwatch::start();
+    if let Some(background) = background {
+        lay_on(&mut frame.image, background);
+    }
+    file::write(&output, &frame.image)?;
+    watch.lap("write");
+    stages.append(&mut frame.report.stages);
+    stages.extend(watch.finish());
+    frame.report.stages = stages;
+    let View { width, height, .. } = view;
+    Ok(Rendered { scene: scene.clone(), output, width, height, report: frame.report })
+}
+
+/// Lays a picture on an opaque background, linear RGB.
+fn lay_on(image: &mut Image, background: [f32; 3]) {
+    for pixel in &mut image.rgba {
+        let transmittance = 1.0 - pixel[3];
+        for (channel, behind) in pixel.iter_mut().zip(background) {
+            *channel += transmittance * behind;
+        }
+        pixel[3] = 1.0;
+    }
+}
+
+/// Lets the first Ctrl-C or SIGTERM end the run at its next check, and the second one at once.
+fn listen(interrupt: &Interrupt) {
+    let interrupt = interrupt.clone();
+    let handler = move || {
+        if interrupt.is_set() {
+            std::process::exit(Error::Interrupted.exit_code().into());
+        }
+        interrupt.set();
+    };
+    // Without a handler the system's own ends the process, which will do.
+    let _ = ctrlc::set_handler(handler);
+}
+
+fn methods() -> PossibleValuesParser {
+    METHODS.iter().map(|entry| PossibleValue::new(entry.name).help(entry.summary)).collect::<Vec<_>>().into()
+}
+
+fn size(text: &str) -> std::result::Result<[u32; 2], String> {
+    let (width, height) = text.split_once(['x', 'X']).ok_or("write it as 640x480")?;
+    let pixels = |side: &str| side.parse().map_err(|_| format!("`{side}` is no number of pixels"));
+    Ok([pixels(width)?, pixels(height)?])
+}

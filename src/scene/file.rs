@@ -1,0 +1,166 @@
+#![doc = include_str!("../../docs/scene.md")]
+//!
+//! # In code
+//!
+//! [`SceneFile`] is what such a text says, read and checked key by key, before any file that it names is
+//! opened; [`load`](crate::scene::load) makes a scene of it.
+
+use std::path::PathBuf;
+
+use serde::Deserialize;
+use toml::Spanned;
+
+use super::camera::DEFAULT_FOV_DEGREES;
+use super::number::{Exactly, FieldOfView, Finite, Fraction, NotNegative, PictureSize, Pixels, Positive, Rounds, Samples};
+use crate::mesh::generate::Generator;
+use crate::mesh::projection::Projection;
+use crate::volume::TransferFunction;
+
+/// A whole scene file.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SceneFile {
+    /// The base mesh; the span is the section's.
+    pub mesh: Spanned<MeshSection>,
+    /// The shell around it.
+    pub shell: ShellSection,
+    /// What fills the shell; the span is the section's.
+    pub volume: Spanned<VolumeSection>,
+    /// Where it is seen from; by default a camera that takes in the whole shell.
+    pub camera: Option<CameraSection>,
+    /// The picture.
+    #[serde(default)]
+    pub image: ImageSection,
+    /// How finely the shell is marched.
+    #[serde(default)]
+    pub march: MarchSection,
+}
+
+/// `[mesh]`: a generator or a file.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MeshSection {
+    /// A generated mesh, with the keys of its generator.
+    pub generator: Option<Generator>,
+    /// A mesh file, relative to the scene file.
+    pub file: Option<PathBuf>,
+    /// How texture coordinates are made, in place of those of the file.
+    pub projection: Option<Projection>,
+}
+
+/// `[shell]`.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ShellSection {
+    /// World units.
+    pub thickness: Positive,
+    /// Rounds of averaging of the extrusion directions.
+    #[serde(default = "no_rounds")]
+    pub smoothing: Rounds,
+    /// Repeats of the texture along u and v for each unit of the mesh's texture coordinates.
+    #[serde(default = "scale_of_one")]
+    pub uv_scale: Exactly<2, Finite>,
+    /// Added after the scale.
+    #[serde(default = "no_offset")]
+    pub uv_offset: Exactly<2, Finite>,
+}
+
+/// `[volume]`: a recipe or a file.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct VolumeSection {
+    /// A recipe file, relative to the scene file.
+    pub recipe: Option<PathBuf>,
+    /// A volume file, a folder of images or a pattern of them, relative to the scene file.
+    pub file: Option<PathBuf>,
+    /// How the scalars of a file become colour and opacity.
+    pub transfer: Option<TransferFunction>,
+    /// The opacity of every texel of a file that has red, green and blue alone.
+    pub alpha: Option<Fraction>,
+    /// World units; by default one level-0 texel along w.
+    pub opacity_distance: Option<Positive>,
+    /// In pixels.
+    #[serde(default = "one_pixel")]
+    pub lod_footprint: NotNegative,
+}
+
+/// `[camera]`.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CameraSection {
+    /// World space.
+    pub eye: Exactly<3, Finite>,
+    /// World space, not the eye.
+    pub target: Spanned<Exactly<3, Finite>>,
+    /// World space, not along the line of sight; by default Y.
+    pub up: Option<Spanned<Exactly<3, Finite>>>,
+    /// The vertical field of view.
+    #[serde(default = "default_fov")]
+    pub fov: FieldOfView,
+    /// World units; by default a thousandth of the distance between eye and target.
+    pub near: Option<Positive>,
+}
+
+/// `[image]`.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct ImageSection {
+    /// Width and height.
+    pub size: PictureSize,
+    /// Linear RGB; a transparent picture without it.
+    pub background: Option<Exactly<3, NotNegative>>,
+}
+
+/// `[march]`.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct MarchSection {
+    /// Which of the two keys below counts.
+    pub plan: Plan,
+    /// In texels: see [`March::Default`](super::March::Default).
+    pub step: Positive,
+    /// In each tetrahedron: see [`March::Paper`](super::March::Paper).
+    pub samples: Samples,
+}
+
+/// How samples are spread.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Plan {
+    /// By length.
+    Default,
+    /// The same number in every tetrahedron.
+    Paper,
+}
+
+impl Default for ImageSection {
+    fn default() -> Self {
+        Self { size: PictureSize([Pixels(512); 2]), background: None }
+    }
+}
+
+impl Default for MarchSection {
+    fn default() -> Self {
+        Self { plan: Plan::Default, step: Positive(0.5), samples: Samples(10) }
+    }
+}
+
+fn no_rounds() -> Rounds {
+    Rounds(0)
+}
+
+fn scale_of_one() -> Exactly<2, Finite> {
+    Exactly([Finite(1.0); 2])
+}
+
+fn no_offset() -> Exactly<2, Finite> {
+    Exactly([Finite(0.0); 2])
+}
+
+fn one_pixel() -> NotNegative {
+    NotNegative(1.0)
+}
+
+fn default_fov() -> FieldOfView {
+    FieldOfView(DEFAULT_FOV_DEGREES)
+}

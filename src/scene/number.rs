@@ -1,0 +1,128 @@
+//! Numbers that cannot hold a value out of their range: what a scene file's keys are made of.
+
+use serde::Deserialize;
+use serde::de::{Deserializer, Error, Unexpected, Visitor};
+
+/// Declares a number whose range is checked as it is read; the second line says the range in words.
+macro_rules! number {
+    ($(#[$doc:meta])* $name:ident = $expecting:literal, $in_range:expr) => {
+        $(#[$doc])*
+        #[derive(Debug, Clone, Copy, PartialEq)]
+        pub struct $name(pub f64);
+
+        impl<'de> Deserialize<'de> for $name {
+            fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+                struct InRange;
+                impl Visitor<'_> for InRange {
+                    type Value = $name;
+                    fn expecting(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                        formatter.write_str($expecting)
+                    }
+                    fn visit_f64<E: Error>(self, value: f64) -> Result<$name, E> {
+                        let in_range: fn(f64) -> bool = $in_range;
+                        if value.is_finite() && in_range(value) {
+                            Ok($name(value))
+                        } else {
+                            Err(E::invalid_value(Unexpected::Float(value), &self))
+                        }
+                    }
+                    fn visit_i64<E: Error>(self, value: i64) -> Result<$name, E> {
+                        self.visit_f64(value as f64)
+                    }
+                }
+                deserializer.deserialize_f64(InRange)
+            }
+        }
+    };
+}
+
+/// Declares a whole number from `$least` to `$most`.
+macro_rules! count {
+    ($(#[$doc:meta])* $name:ident = $least:literal..=$most:literal) => {
+        $(#[$doc])*
+        #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+        pub struct $name(pub u32);
+
+        impl<'de> Deserialize<'de> for $name {
+            fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+                struct InRange;
+                impl Visitor<'_> for InRange {
+                    type Value = $name;
+                    fn expecting(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                        write!(formatter, "a whole number from {} to {}", $least, $most)
+                    }
+                    fn visit_i64<E: Error>(self, value: i64) -> Result<$name, E> {
+                        match u32::try_from(value) {
+                            Ok(count) if ($least..=$most).contains(&count) => Ok($name(count)),
+                            _ => Err(E::invalid_value(Unexpected::Signed(value), &self)),
+                        }
+                    }
+                }
+                deserializer.deserialize_u32(InRange)
+            }
+        }
+    };
+}
+
+number! {
+    /// Any finite number.
+    Finite = "a finite number", |_| true
+}
+number! {
+    /// Finite, above 0.
+    Positive = "a finite number greater than 0", |value| value > 0.0
+}
+number! {
+    /// Finite, 0 or above.
+    NotNegative = "a finite number of at least 0", |value| value >= 0.0
+}
+number! {
+    /// From 0 to 1, both included.
+    Fraction = "a number from 0 to 1", |value| (0.0..=1.0).contains(&value)
+}
+number! {
+    /// An angle in degrees, above 0 and below 180.
+    FieldOfView = "an angle in degrees between 0 and 180, both excluded", |value| value > 0.0 && value < 180.0
+}
+count! {
+    /// The width or height of a picture, in pixels.
+    Pixels = 1..=32768
+}
+count! {
+    /// Rounds of smoothing.
+    Rounds = 0..=1000
+}
+count! {
+    /// Samples in one tetrahedron.
+    Samples = 1..=4096
+}
+
+/// A list of exactly `N` values. (Serde's own arrays let a list be longer.)
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(try_from = "Vec<T>", bound = "T: Deserialize<'de>")]
+pub struct Exactly<const N: usize, T>(pub [T; N]);
+
+impl<const N: usize, T> TryFrom<Vec<T>> for Exactly<N, T> {
+    type Error = String;
+
+    fn try_from(list: Vec<T>) -> Result<Self, String> {
+        let values = list.try_into();
+        values
+            .map(Self)
+            .map_err(|list: Vec<T>| format!("invalid length {}, expected a list of {N}", list.len()))
+    }
+}
+
+/// Width and height of a picture that fits into memory: at most 2^28 pixels.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(try_from = "Exactly<2, Pixels>")]
+pub struct PictureSize(pub [Pixels; 2]);
+
+impl TryFrom<Exactly<2, Pixels>> for PictureSize {
+    type Error = &'static str;
+
+    fn try_from(Exactly(size): Exactly<2, Pixels>) -> Result<Self, Self::Error> {
+        let pixels: u64 = size.iter().map(|side| u64::from(side.0)).product();
+        if pixels <= 1 << 28 { Ok(Self(size)) } else { Err("too large a picture, expected at most 2^28 pixels") }
+    }
+}
