@@ -14,9 +14,8 @@
 //!   in front of the eye are met (the near plane plays no part);
 //! - runs may overlap where the shell overlaps itself: a tetrahedron is related to every entry
 //!   until a run that began after it must have ended;
-//! - a ray through an edge or vertex is taken as passing just beside it, by an infinitesimal step to the
-//!   right and a yet smaller one down: shared edges are crossed exactly once, and faces that meet the ray at one
-//!   depth, within rounding, are sorted by their depth just beside it.
+//! - samples stand [`NUDGE`] off the pixel centres: a symmetric scene sends rays exactly through edges and
+//!   vertices, where rounding would decide on its own which faces are met, and in which order.
 //!
 //! Inverse depth is used for depth: it is linear in pixel coordinates over a plane.
 
@@ -31,13 +30,13 @@ use crate::scene::View;
 /// Rows of pixels that are worked on together: few enough that their fragments stay in the cache.
 const BAND: usize = 16;
 
-/// Inverse depths that differ by less than this, relatively, are a tie. Their own error is a few units of
-/// rounding (1e-16) over the cosine of the angle between ray and normal; this allows for cosines down to
-/// about 1e-4.
-const TIE: f64 = 1e-11;
+/// Pixels right and down from a pixel's centre to its sample. Far above the rounding of projected vertices
+/// (1e-13 pixels), so that nothing near a sample is decided by rounding where vertices stand on centres;
+/// far below any distance that matters: what a ray cuts off by less than this is thinner than 1e-10 pixels.
+const NUDGE: [f64; 2] = [1e-10, 0.6180339887e-10];
 
 /// Pixels by which bounds are widened before pixels are tested one by one: above the rounding of a
-/// projected coordinate (1e-16 of an image at most 1e6 wide), and small enough to cost nothing.
+/// projected coordinate and above [`NUDGE`], and small enough to cost nothing.
 const MARGIN: f64 = 1e-6;
 
 /// End of a list of fragments.
@@ -57,7 +56,7 @@ impl Line {
         Self { x: normal.x * pixel * scale, y: normal.y * pixel * scale, constant: normal.z * scale }
     }
 
-    /// Whether pixels where the function is zero count as positive: its sign just beside them.
+    /// Whether samples where the function is zero count as positive. Of two faces on one edge one owns it.
     fn owns_zero(&self) -> bool {
         self.x > 0.0 || (self.x == 0.0 && self.y > 0.0)
     }
@@ -72,12 +71,17 @@ struct Raster {
 }
 
 impl Raster {
-    /// The middle of pixel `(x, y)` from the image's middle, along one axis of `size` pixels. Exact.
-    fn centre(index: usize, size: usize) -> f64 {
-        index as f64 + 0.5 - 0.5 * size as f64
+    /// Where column `x` is sampled, from the image's middle.
+    fn column(self, x: usize) -> f64 {
+        x as f64 + 0.5 - 0.5 * self.width as f64 + NUDGE[0]
     }
 
-    /// The indices, of `size` along one axis, whose centres lie in `low..=high`, with a margin.
+    /// Where row `y` is sampled, from the image's middle.
+    fn row(self, y: usize) -> f64 {
+        y as f64 + 0.5 - 0.5 * self.height as f64 + NUDGE[1]
+    }
+
+    /// The indices, of `size` along one axis, whose samples lie in `low..=high`, with a margin.
     fn indices(low: f64, high: f64, size: usize) -> Range<usize> {
         let first = 0.5 * size as f64 - 0.5;
         let begin = (low + first - MARGIN).ceil().clamp(0.0, size as f64);
@@ -144,17 +148,16 @@ impl Footprint {
             return None; // seen from the side, thinner than rounding
         }
         // An edge function has the same bits, up to its sign, for every triangle on that edge.
-        let edges =
-            [q.cross(r), r.cross(p), p.cross(q)].map(|normal| Line::new(normal, pixel, eye_side));
+        let edges = [q.cross(r), r.cross(p), p.cross(q)].map(|normal| Line::new(normal, pixel, eye_side));
         let inverse_depth = Line::new(normal, pixel, distance.recip());
         Some(Self { edges, inverse_depth, columns, rows, cell: face.cell, leaves: face.leaves })
     }
 
     /// Calls `visit(x, inverse depth)` for the pixels of row `y` that are covered.
     fn cover_row(&self, y: usize, raster: Raster, mut visit: impl FnMut(usize, f64)) {
-        let centre_y = Raster::centre(y, raster.height);
+        let row = raster.row(y);
         let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);
-        let at_row = self.edges.map(|edge| edge.y * centre_y + edge.constant);
+        let at_row = self.edges.map(|edge| edge.y * row + edge.constant);
         for (edge, at_row) in self.edges.iter().zip(at_row) {
             let crossing = -at_row / edge.x;
             if edge.x > 0.0 {
@@ -165,16 +168,16 @@ impl Footprint {
         }
         let span = Raster::indices(low, high, raster.width);
         let columns = span.start.max(self.columns.start)..span.end.min(self.columns.end);
-        let depth_at_row = self.inverse_depth.y * centre_y + self.inverse_depth.constant;
+        let depth_at_row = self.inverse_depth.y * row + self.inverse_depth.constant;
         let owns_zero = self.edges.map(|edge| edge.owns_zero());
         for x in columns {
-            let centre_x = Raster::centre(x, raster.width);
+            let column = raster.column(x);
             let covered = (0..3).all(|i| {
-                let value = self.edges[i].x * centre_x + at_row[i];
+                let value = self.edges[i].x * column + at_row[i];
                 value > 0.0 || (value == 0.0 && owns_zero[i])
             });
             if covered {
-                visit(x, self.inverse_depth.x * centre_x + depth_at_row);
+                visit(x, self.inverse_depth.x * column + depth_at_row);
             }
         }
     }
@@ -260,13 +263,7 @@ fn footprints_of_bands(footprints: &[Footprint], raster: Raster) -> Vec<Vec<u32>
 
 impl Scratch {
     /// Fills the lists of the pixels of one band.
-    fn collect_fragments(
-        &mut self,
-        band: usize,
-        members: &[u32],
-        footprints: &[Footprint],
-        raster: Raster,
-    ) {
+    fn collect_fragments(&mut self, band: usize, members: &[u32], footprints: &[Footprint], raster: Raster) {
         self.heads.fill(NONE);
         self.fragments.clear();
         let first_row = band * BAND;
@@ -333,24 +330,12 @@ impl Scratch {
     }
 }
 
-/// Sorts the fragments of a pixel by depth; those of equal depth by their depth just beside the pixel's
-/// centre, then leaves before entries (faces in the same place), then by id.
+/// Sorts the fragments of a pixel by depth; faces in the same place (equal to the last bit, since the
+/// order of a face's vertices is canonical) by leaves before entries, then by id.
 fn sort_front_to_back(list: &mut [Fragment], footprints: &[Footprint]) {
     list.sort_unstable_by(|a, b| {
-        b.inverse_depth.total_cmp(&a.inverse_depth).then(a.footprint.cmp(&b.footprint))
+        let leaves = |fragment: &Fragment| footprints[fragment.footprint as usize].leaves;
+        let nearer = b.inverse_depth.total_cmp(&a.inverse_depth);
+        nearer.then_with(|| leaves(b).cmp(&leaves(a))).then(a.footprint.cmp(&b.footprint))
     });
-    let tied = |a: &Fragment, b: &Fragment| b.inverse_depth >= a.inverse_depth * (1.0 - TIE);
-    for group in list.chunk_by_mut(tied).filter(|group| group.len() > 1) {
-        group.sort_unstable_by(|a, b| {
-            let (id_a, id_b) = (a.footprint, b.footprint);
-            let (a, b) = (&footprints[id_a as usize], &footprints[id_b as usize]);
-            let (slope_a, slope_b) = (&a.inverse_depth, &b.inverse_depth);
-            slope_b
-                .x
-                .total_cmp(&slope_a.x)
-                .then(slope_b.y.total_cmp(&slope_a.y))
-                .then(b.leaves.cmp(&a.leaves))
-                .then(id_a.cmp(&id_b))
-        });
-    }
 }

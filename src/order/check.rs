@@ -53,7 +53,9 @@ pub struct Check {
 }
 
 impl Check {
-    fn and(mut self, other: Self) -> Self {
+    /// Both findings together.
+    #[must_use]
+    pub fn and(mut self, other: Self) -> Self {
         self.rays += other.rays;
         self.wrong_rays += other.wrong_rays;
         self.pairs += other.pairs;
@@ -202,9 +204,8 @@ pub fn check(shell: &Shell, order: &Order, eye: DVec3, rays: &[DVec3]) -> Check 
     rays.par_chunks(256)
         .map(|rays| {
             let mut intervals = Vec::new();
-            rays.iter().fold(Check::default(), |found, &ray| {
-                found.and(check_ray(solids, tree, ray, &mut intervals))
-            })
+            rays.iter()
+                .fold(Check::default(), |found, &ray| found.and(check_ray(solids, tree, ray, &mut intervals)))
         })
         .collect::<Vec<_>>()
         .into_iter()
@@ -262,9 +263,8 @@ fn check_ray(solids: &[Solid], tree: &Bvh<f64, 3>, ray: DVec3, intervals: &mut V
                 found.cyclic += 1;
                 continue;
             }
-            let may_precede = |a: &Interval, b: &Interval| {
-                a.exit.value - b.entry.value <= a.exit.error + b.entry.error
-            };
+            let may_precede =
+                |a: &Interval, b: &Interval| a.exit.value - b.entry.value <= a.exit.error + b.entry.error;
             match (may_precede(front, back), may_precede(back, front)) {
                 (true, true) => found.undecided += 1,
                 (false, false) => found.overlapping += 1,

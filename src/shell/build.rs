@@ -78,10 +78,10 @@ impl Shell {
         let faults = tetrahedra
             .zip(&self.texture)
             .zip(&mut self.cells)
-            .map(|((&ids, texture), cell)| {
+            .map(|((ids, texture), cell)| {
                 let corners = ids.map(|id| vertices[id as usize]);
                 let determinant = cell::determinant(corners);
-                *cell = cell::maps(vertices, ids, texture, determinant);
+                *cell = cell::maps(corners, *texture, determinant);
                 health::Faults::of(corners, determinant, cell)
             })
             .reduce(health::Faults::default, |x, y| x + y);

@@ -92,8 +92,13 @@ fn quality([a, b, c, d]: [DVec3; 4], determinant: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use std::f64::consts::PI;
+
+    use glam::DVec2;
+
     use super::*;
-    use crate::shell::cell;
+    use crate::mesh::generate::{Generator, Sphere, Torus};
+    use crate::shell::{Shell, cell};
 
     const REGULAR: [DVec3; 4] = [
         DVec3::new(1.0, 1.0, 1.0),
@@ -101,6 +106,41 @@ mod tests {
         DVec3::new(-1.0, 1.0, -1.0),
         DVec3::new(-1.0, -1.0, 1.0),
     ];
+
+    fn sphere() -> Mesh {
+        Generator::Sphere(Sphere { radius: 1.0, segments: 14, rings: 9 }).build().expect("sound parameters")
+    }
+
+    /// With vertices exactly on its inner equator, where its radius is 0.75.
+    fn torus() -> Mesh {
+        let torus = Torus { major_radius: 1.0, minor_radius: 0.25, segments: 16, rings: 16 };
+        Generator::Torus(torus).build().expect("sound parameters")
+    }
+
+    /// `count` copies of the unit triangle, side by side and apart.
+    fn row(count: u32) -> Mesh {
+        let mut mesh = Mesh::default();
+        for i in 0..count {
+            let at = DVec3::X * 3.0 * f64::from(i);
+            mesh.positions.extend([at, at + DVec3::X, at + DVec3::Y]);
+            mesh.normals.extend([DVec3::Z; 3]);
+            mesh.triangles.push([3 * i, 3 * i + 1, 3 * i + 2]);
+            mesh.uvs.push([DVec2::ZERO, DVec2::X, DVec2::Y]);
+        }
+        mesh
+    }
+
+    /// The same surface with its other side out.
+    fn inside_out(mut mesh: Mesh) -> Mesh {
+        mesh.normals.iter_mut().for_each(|normal| *normal = -*normal);
+        mesh.triangles.iter_mut().for_each(|ids| ids.swap(1, 2));
+        mesh.uvs.iter_mut().for_each(|uvs| uvs.swap(1, 2));
+        mesh
+    }
+
+    fn of(mesh: &Mesh, options: &ShellOptions) -> Health {
+        Shell::build(mesh, options).expect("a sound mesh").health
+    }
 
     #[test]
     fn quality_is_one_when_regular_at_any_scale_and_less_otherwise() {
@@ -127,7 +167,7 @@ mod tests {
     fn faults_are_told_apart() {
         let faults = |vertices: [DVec3; 4]| {
             let determinant = cell::determinant(vertices);
-            let found = cell::maps(&vertices, [0, 1, 2, 3], &REGULAR, determinant);
+            let found = cell::maps(vertices, REGULAR, determinant);
             let Faults { inverted, zero_volume, slivers } = Faults::of(vertices, determinant, &found);
             [inverted, zero_volume, slivers]
         };
@@ -137,5 +177,82 @@ mod tests {
         assert_eq!(faults(lowered(0.0)), [0, 1, 0]);
         assert_eq!(faults(lowered(1e-4)), [0, 0, 1]);
         assert_eq!(faults(lowered(-1e-4)), [1, 0, 1]);
+    }
+
+    #[test]
+    fn sound_shells_have_no_faults() {
+        for (mesh, boundary_edges) in [(row(5), 15), (sphere(), 0), (torus(), 0)] {
+            let expected =
+                Health { tetrahedra: 3 * mesh.triangles.len() as u64, boundary_edges, ..Health::default() };
+            assert_eq!(of(&mesh, &ShellOptions::new(0.1)), expected);
+        }
+    }
+
+    #[test]
+    fn planted_faults_are_counted_exactly() {
+        let sound = Health { tetrahedra: 21, boundary_edges: 21, ..Health::default() };
+        let mut mesh = row(7);
+        let mut options = ShellOptions { thickness_scale: vec![1.0; 21], ..ShellOptions::new(0.5) };
+        assert_eq!(of(&mesh, &options), sound);
+
+        mesh.normals[0..3].fill(-DVec3::Z);
+        assert_eq!(of(&mesh, &options), Health { inverted: 3, ..sound });
+
+        // Flat over one vertex: one tetrahedron of that prism. Flat over all: three.
+        options.thickness_scale[4] = 0.0;
+        assert_eq!(of(&mesh, &options), Health { inverted: 3, zero_volume: 1, ..sound });
+        options.thickness_scale[6..9].fill(0.0);
+        assert_eq!(of(&mesh, &options), Health { inverted: 3, zero_volume: 4, ..sound });
+
+        // Half legs, 1e-4 of a leg high: quality is near sqrt(2) 1e-4 / (7/6)^(3/2).
+        options.thickness_scale[9..12].fill(2e-4);
+        assert_eq!(of(&mesh, &options), Health { inverted: 3, zero_volume: 4, slivers: 3, ..sound });
+
+        // A second triangle that runs along an edge the same way as the first: it lies upside down.
+        mesh.positions.push(DVec3::new(12.5, -1.0, 0.0));
+        mesh.normals.push(DVec3::Z);
+        options.thickness_scale.push(1.0);
+        mesh.triangles.push([12, 13, 21]);
+        mesh.uvs.push([DVec2::ZERO; 3]);
+        let expected = Health {
+            tetrahedra: 24,
+            inverted: 6,
+            zero_volume: 4,
+            slivers: 3,
+            non_manifold_edges: 1,
+            boundary_edges: 22,
+            overlap_risk_vertices: 0,
+        };
+        assert_eq!(of(&mesh, &options), expected);
+    }
+
+    #[test]
+    fn a_bowl_thicker_than_its_radius_is_at_risk_and_a_ball_is_not() {
+        let risk = |mesh: &Mesh, thickness| of(mesh, &ShellOptions::new(thickness)).overlap_risk_vertices;
+        let (ball, bowl) = (sphere(), inside_out(sphere()));
+        // On a sphere the estimate is the radius itself, up to rounding.
+        assert_eq!(risk(&bowl, 1.0 + 1e-9), bowl.positions.len() as u64);
+        assert_eq!(risk(&bowl, 1.0 - 1e-9), 0);
+        assert_eq!(risk(&ball, 100.0), 0);
+    }
+
+    #[test]
+    fn only_the_thick_vertices_of_a_bowl_are_at_risk() {
+        let bowl = inside_out(sphere());
+        let mut options = ShellOptions::new(0.5);
+        options.thickness_scale = vec![1.0; bowl.positions.len()];
+        options.thickness_scale[10] = 2.1;
+        options.thickness_scale[20] = 2.1;
+        assert_eq!(of(&bowl, &options).overlap_risk_vertices, 2);
+    }
+
+    /// Around its hole a torus is concave: with radius 0.75 on the inner equator, and with radius
+    /// `(1 + 0.25 cos v) / -cos v = 0.832` on the next of 16 rings, `v = pi - pi / 8`.
+    #[test]
+    fn a_torus_is_at_risk_on_its_inner_equator() {
+        let next = (PI - PI / 8.0).cos();
+        assert!(((1.0 + 0.25 * next) / -next - 0.832).abs() < 1e-3);
+        let risk = |thickness| of(&torus(), &ShellOptions::new(thickness)).overlap_risk_vertices;
+        assert_eq!([0.749, 0.751, 0.83, 0.84].map(risk), [0, 16, 16, 48]);
     }
 }

@@ -82,7 +82,7 @@ pub struct Health {
     pub tetrahedra: u64,
     /// Negative volume: the shell folds over there.
     pub inverted: u64,
-    /// Volume exactly zero (by exact arithmetic on the vertices), so that the [`Cell`] is zero: never
+    /// Volume exactly zero (by exact arithmetic on the vertices), or the [`Cell`] zero for want of range: never
     /// drawn, still in the order.
     pub zero_volume: u64,
     /// Shape quality below [`SLIVER_QUALITY`], but not of zero volume.
@@ -135,7 +135,10 @@ impl ShellOptions {
 
 impl Topology {
     /// Shell vertex ids of face `k` of tetrahedron `t`, counter-clockwise seen from outside when the
-    /// tetrahedron's volume is positive.
+    /// tetrahedron's volume is positive, starting at the smallest.
+    ///
+    /// The tetrahedron beyond thus sees the same three from the same start, the other way round: what both
+    /// compute from their edges is the same to the bit, up to its sign.
     pub fn face(&self, t: usize, k: usize) -> [u32; 3] {
         FACES[k].map(|corner| self.tetrahedra[t][corner])
     }
@@ -169,13 +172,14 @@ impl Shell {
     /// The two tetrahedra at a shared face get the same plane, bit for bit, up to its sign.
     pub fn planes(&self, t: usize) -> [DVec4; 4] {
         std::array::from_fn(|k| {
-            let (normal, origin) = cell::area_vector(&self.vertices, self.face(t, k));
-            let inward = self.cells[t].gradients[k].dot(normal);
+            let corners = self.face(t, k).map(|id| self.vertices[id as usize]);
+            let area = cell::area_vector(corners);
+            let inward = self.cells[t].gradients[k].dot(area);
             if inward == 0.0 {
                 return DVec4::ZERO;
             }
-            let normal = normal.normalize() * inward.signum();
-            normal.extend(-normal.dot(origin))
+            let normal = area.normalize() * inward.signum();
+            normal.extend(-normal.dot(corners[0]))
         })
     }
 

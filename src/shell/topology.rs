@@ -15,7 +15,8 @@ use crate::{Error, Result};
 type PrismVertex = (usize, bool);
 
 /// The split where the sorted triangle runs counter-clockwise; where it runs clockwise, the last two
-/// vertices of each change places, so that volumes stay positive.
+/// vertices of each change places, so that volumes stay positive. Either way every face starts at its smallest
+/// id.
 const SPLIT: [[PrismVertex; 4]; 3] = [
     [(0, false), (1, false), (2, false), (2, true)],
     [(0, false), (1, false), (2, true), (1, true)],

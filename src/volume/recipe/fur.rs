@@ -46,11 +46,11 @@ keys! {
         /// Opacity, over one voxel, of what strands fill entirely.
         opacity: f32 = 0.92, 0.0..=0.98;
         /// How dark the fur is at its roots: 0 as bright as at the tips, 1 black.
-        occlusion: f32 = 0.8, 0.0..=1.0;
+        occlusion: f32 = 0.9, 0.0..=1.0;
         /// Colour at the root.
-        root_colour: Colour = srgb(0x5a3418);
+        root_colour: Colour = srgb(0x6e3f20);
         /// Colour at the tip.
-        tip_colour: Colour = srgb(0xf0c078);
+        tip_colour: Colour = srgb(0xf6cc92);
         /// How much strands differ in brightness.
         colour_variation: f32 = 0.5, 0.0..=1.0;
         /// Colour of the skin.
@@ -153,8 +153,8 @@ impl Fur {
 
     fn colour_at(&self, strand: &Strand, along: f32, level: f32) -> Vec3 {
         let colour = Vec3::lerp(self.root_colour.0, self.tip_colour.0, smoothstep(0., 1., along));
-        let light = 1. - self.occlusion * (1. - smoothstep(-0.2, 0.9, level));
-        colour * strand.brightness * light * light
+        let light = 1. - self.occlusion * (1. - smoothstep(-0.05, 0.85, level));
+        colour * strand.brightness * light
     }
 }
 

@@ -63,6 +63,17 @@ impl Grid {
         texels.par_chunks_mut(self.size[0] * self.size[1]).enumerate().for_each(|(k, slice)| draw(k, slice));
     }
 
+    /// Blurs by half a texel or so along each axis (weights 1/4, 1/2, 1/4), so that no step is steeper than
+    /// linear interpolation can follow.
+    pub fn soften(&self, texels: &mut [[f32; 4]]) {
+        let [nu, nv, _] = self.size;
+        self.slices(texels, |_, slice| {
+            slice.chunks_mut(nu).for_each(|row| soften_blocks(row, 1, true));
+            soften_blocks(slice, nu, true);
+        });
+        soften_blocks(texels, nu * nv, false);
+    }
+
     /// The texel indices along `axis` (0 or 1) whose centres lie between two tile coordinates, and their
     /// coordinates without wrapping; no index comes twice.
     pub fn between(&self, axis: usize, from: f32, to: f32) -> impl Iterator<Item = (usize, f32)> + Clone {
@@ -71,6 +82,25 @@ impl Grid {
         let last = ((to * count as f32 - 0.5).floor() as i64).min(first + count - 1);
         (first..=last)
             .map(move |index| (index.rem_euclid(count) as usize, (index as f32 + 0.5) / count as f32))
+    }
+}
+
+/// Mixes blocks of `length` texels with the blocks before and after them; beyond the ends are the first and
+/// last block again, the other way round where it `wraps`.
+fn soften_blocks(texels: &mut [[f32; 4]], length: usize, wraps: bool) {
+    let count = texels.len() / length;
+    let first = texels[..length].to_vec();
+    let mut before = if wraps { texels[texels.len() - length..].to_vec() } else { first.clone() };
+    for index in 0..texels.len() {
+        let (block, within) = (index / length, index % length);
+        let here = texels[index];
+        let after = match block + 1 < count {
+            true => texels[index + length],
+            false if wraps => first[within],
+            false => here,
+        };
+        texels[index] = std::array::from_fn(|c| 0.25 * (before[within][c] + after[c]) + 0.5 * here[c]);
+        before[within] = here;
     }
 }
 

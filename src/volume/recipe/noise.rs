@@ -139,11 +139,19 @@ pub(super) fn nearest_feature(point: Vec3, period: [u32; 2], seed: u32) -> Featu
     let floor = point.floor();
     let (cell, within) = (floor.as_ivec3(), point - floor);
     let period = period.map(|cells| cells as i32);
+    // Squared distances to the near faces of the neighbours -1, 0, 1: cells farther than what was found are
+    // passed over, and nearer cells come first.
+    let gaps = [within * within, Vec3::ZERO, (1. - within) * (1. - within)];
+    let gap = |step: i32| gaps[(step + 1) as usize];
+    const STEPS: [i32; 3] = [0, -1, 1];
     let mut nearest = Feature { offset: Vec3::INFINITY, id: 0 };
     let mut squared = f32::INFINITY;
-    for z in -1..=1 {
-        for y in -1..=1 {
-            for x in -1..=1 {
+    for z in STEPS {
+        for y in STEPS {
+            for x in STEPS {
+                if gap(x).x + gap(y).y + gap(z).z >= squared {
+                    continue;
+                }
                 let neighbour = IVec3::new(x, y, z);
                 let id = hash(wrap(cell + neighbour, period), seed);
                 let jitter = Vec3::new(unit(id, 0, 10), unit(id, 10, 11), unit(id, 21, 11));
@@ -156,4 +164,67 @@ pub(super) fn nearest_feature(point: Vec3, period: [u32; 2], seed: u32) -> Featu
         }
     }
     nearest
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        /// Exact, because the lattice wraps as integers; a whole point's fraction is exactly 0.
+        #[test]
+        fn both_noises_repeat_exactly(
+            periods in [1u32..20, 1u32..20], y in 0f32..20., z in -3f32..3., seed: u32,
+        ) {
+            let near = Vec3::new(0., y, z);
+            let far = Vec3::new(periods[0] as f32, y, z);
+            prop_assert_eq!(gradient(near, periods, seed), gradient(far, periods, seed));
+            let features = [near, far].map(|point| nearest_feature(point, periods, seed));
+            prop_assert_eq!(features[0].offset, features[1].offset);
+            prop_assert_eq!(features[0].id, features[1].id);
+            let swapped = [near, far].map(|p| gradient(Vec3::new(p.y, p.x, p.z), [periods[1], periods[0]], seed));
+            prop_assert_eq!(swapped[0], swapped[1]);
+        }
+
+        /// 1.04 is the known maximum of three-dimensional noise with these gradients.
+        #[test]
+        fn gradient_noise_keeps_its_bounds(x in 0f32..8., y in 0f32..8., z in -8f32..8., seed: u32) {
+            prop_assert!(gradient(Vec3::new(x, y, z), [8, 8], seed).abs() <= 1.04);
+            prop_assert_eq!(gradient(Vec3::new(x, y, z).floor(), [8, 8], seed), 0.);
+        }
+
+        /// The cells that are passed over hold nothing nearer.
+        #[test]
+        fn the_nearest_feature_is_the_nearest_of_all_27(
+            x in 0f32..5., y in 0f32..5., z in 0f32..5., seed: u32,
+        ) {
+            let point = Vec3::new(x, y, z);
+            let found = nearest_feature(point, [5, 5], seed).offset.length();
+            let cell = point.floor().as_ivec3();
+            let all = (0..27).map(|index| {
+                let neighbour = cell + IVec3::new(index % 3, index / 3 % 3, index / 9) - 1;
+                let id = hash(wrap(neighbour, [5, 5]), seed);
+                let jitter = Vec3::new(unit(id, 0, 10), unit(id, 10, 11), unit(id, 21, 11));
+                (neighbour.as_vec3() + jitter).distance(point)
+            });
+            // Both are within a few roundings of coordinates up to 6, whose spacing is 4.8e-7.
+            prop_assert!((all.fold(f32::INFINITY, f32::min) - found).abs() < 4e-6);
+        }
+    }
+
+    #[test]
+    fn noise_without_the_right_period_does_not_repeat() {
+        let at = |x: f32| gradient(Vec3::new(x, 0.4, 0.3), [8, 8], 1);
+        assert_ne!(at(0.), at(7.));
+    }
+
+    #[test]
+    fn finer_grids_add_octaves_and_change_no_others() {
+        let octaves = |finest| Octaves { cells: 2, count: 4, gain: 0.5, finest };
+        let weights = |finest| octaves(finest).sum(0, |_, _| 1.);
+        assert_eq!(weights(16), 1.);
+        assert_eq!(weights(8), 14. / 15.);
+        assert_eq!(weights(0), 8. / 15.);
+    }
 }

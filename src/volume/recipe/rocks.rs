@@ -30,19 +30,19 @@ keys! {
         /// How angular the stones are: 0 is smooth.
         angularity: f32 = 0.5, 0.0..=1.0;
         /// Depth of the bumps as a share of a stone's radius.
-        roughness: f32 = 0.12, 0.0..=0.5;
+        roughness: f32 = 0.1, 0.0..=0.5;
         /// Height of the ground as a share of the shell's thickness.
         ground: f32 = 0.2, 0.0..=0.9;
         /// How dark it is between the stones.
-        occlusion: f32 = 0.8, 0.0..=1.0;
+        occlusion: f32 = 0.9, 0.0..=1.0;
         /// How much the stones are mottled.
-        mottling: f32 = 0.5, 0.0..=1.0;
+        mottling: f32 = 0.6, 0.0..=1.0;
         /// Colours of the stones run from this one
         light_colour: Colour = srgb(0xb9b2a4);
         /// to this one.
         dark_colour: Colour = srgb(0x6f675f);
         /// The colour of some of the stones.
-        accent_colour: Colour = srgb(0xa07a58);
+        accent_colour: Colour = srgb(0x96785e);
         /// Colour of the ground.
         ground_colour: Colour = srgb(0x4b3d2e);
     }
@@ -109,14 +109,29 @@ impl Rocks {
         Stone { centre: place.extend(sunk), radius, turn: turn.inverse(), shape, facets, colour }
     }
 
-    /// Draws the part of a stone that crosses the slice at height `z`, where it is nearer than what `depth`
-    /// (distances to the surfaces drawn so far) holds.
+    fn draw_ground(&self, grid: &Grid, k: usize, seed: u32, slice: &mut [[f32; 4]]) {
+        let relief = 0.1 * grid.height;
+        let above = grid.position(0, 0, k).z - self.ground * grid.height;
+        if above > 1.04 * relief + grid.voxel() {
+            return;
+        }
+        let soil = Octaves { cells: 10, count: 4, gain: 0.6, finest: grid.finest_noise() };
+        let light = 1. - 0.7 * self.occlusion;
+        for (index, texel) in slice.iter_mut().enumerate() {
+            let position = grid.position(index % grid.size[0], index / grid.size[0], k);
+            let noise = soil.gradient(position, seed ^ 0x77);
+            let colour = self.ground_colour.0 * light * (1. + noise);
+            lay_over(texel, colour, grid.coverage(above - relief * noise));
+        }
+    }
+
+    /// Draws the part of a stone that crosses the slice at height `z`.
     fn draw_stone(&self, stone: &Stone, grid: &Grid, z: f32, seed: u32, slice: &mut [[f32; 4]]) {
-        let reach = stone.radius * (1. + self.roughness) + grid.voxel();
+        let reach = stone.radius * (1. + 1.7 * self.roughness) + 1.25 * grid.voxel();
         if (z - stone.centre.z).abs() > reach {
             return;
         }
-        let bumps = Octaves { cells: 12, count: 4, gain: 0.55, finest: grid.finest_noise() };
+        let bumps = Octaves { cells: 12, count: 4, gain: 0.4, finest: grid.finest_noise() };
         let mottles = Octaves { cells: 9, count: 5, gain: 0.75, finest: grid.finest_noise() };
         for (j, y) in grid.between(1, stone.centre.y - reach, stone.centre.y + reach) {
             for (i, x) in grid.between(0, stone.centre.x - reach, stone.centre.x + reach) {
@@ -126,11 +141,12 @@ impl Rocks {
                     continue;
                 }
                 let smooth = stone.distance(from_centre);
-                if smooth > grid.voxel() + self.roughness * stone.radius {
+                if smooth > 1.25 * grid.voxel() + 1.7 * self.roughness * stone.radius {
                     continue;
                 }
                 let bump = bumps.gradient(position, seed) * self.roughness * stone.radius * 1.6;
-                let alpha = grid.coverage(smooth - bump);
+                // The bumps make the estimate of the distance up to a fifth too steep.
+                let alpha = grid.coverage(0.8 * (smooth - bump));
                 if alpha > 0. {
                     let mottle = 1. + 1.6 * self.mottling * mottles.gradient(position, seed ^ 0x3d);
                     let colour = stone.colour * mottle * self.light(grid, z, from_centre.z / stone.shape.z);
@@ -168,20 +184,9 @@ impl Stone {
 impl Pattern for Rocks {
     fn draw(&self, grid: &Grid, seed: u32, texels: &mut [[f32; 4]]) {
         let stones = self.stones(grid.height, seed);
-        let soil = Octaves { cells: 10, count: 4, gain: 0.6, finest: grid.finest_noise() };
         grid.slices(texels, |k, slice| {
-            for (index, texel) in slice.iter_mut().enumerate() {
-                let position = grid.position(index % grid.size[0], index / grid.size[0], k);
-                let surface = grid.height * self.ground;
-                if position.z > surface + 0.1 * grid.height {
-                    break;
-                }
-                let noise = soil.gradient(position, seed ^ 0x77);
-                let alpha = grid.coverage(position.z - surface - 0.1 * grid.height * noise);
-                let light = 1. - 0.7 * self.occlusion;
-                lay_over(texel, self.ground_colour.0 * light * (1. + noise), alpha);
-            }
             let z = grid.position(0, 0, k).z;
+            self.draw_ground(grid, k, seed, slice);
             for stone in &stones {
                 self.draw_stone(stone, grid, z, seed, slice);
             }

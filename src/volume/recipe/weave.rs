@@ -116,7 +116,7 @@ impl Pattern for Weave {
             let (warp_index, warp) = at(position.x, position.y, 0.);
             let (weft_index, weft) = at(position.y, position.x, 1.);
             let level = (position.z - cloth.middle) / (2. * cloth.half_thickness);
-            let light = 1. - self.occlusion * smoothstep(1., -0.8, level);
+            let light = 1. - self.occlusion * smoothstep(0.95, -0.4, level);
             let mut threads = [
                 (
                     &weft,

@@ -1,0 +1,211 @@
+//! Recipes: what every volume they make has in common, and what is said of a recipe that makes no sense.
+
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
+
+use mesoshell::volume::{Volume, recipe};
+use mesoshell::{Error, Result};
+
+const NAMES: [&str; 5] = ["clouds", "fog", "fur", "rocks", "weave"];
+
+fn shipped(name: &str) -> recipe::Recipe {
+    let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("volumes").join(name).with_extension("toml");
+    recipe::load(path).unwrap_or_else(|error| panic!("{error}"))
+}
+
+fn small(name: &str, keys: &str) -> Volume {
+    let recipe = recipe::parse("test", &format!("recipe = \"{name}\"\n{keys}")).unwrap();
+    recipe.build_with_size([40, 36, 12]).unwrap()
+}
+
+fn assert_sound(volume: &Volume, name: &str) {
+    let count: u64 = volume.size.iter().map(|&n| u64::from(n)).product();
+    assert_eq!(volume.texels.len() as u64, count, "{name}");
+    for texel in &volume.texels {
+        let [colour @ .., alpha] = texel;
+        assert!(colour.iter().all(|c| c.is_finite() && *c >= 0.), "{name}: {texel:?}");
+        assert!((0. ..=1.).contains(alpha), "{name}: {texel:?}");
+    }
+}
+
+#[test]
+fn shipped_recipes_are_sound_and_quick() {
+    for name in NAMES {
+        let recipe = shipped(name);
+        let start = Instant::now();
+        let volume = recipe.build().unwrap();
+        // Ten times what two idle cores need.
+        assert!(start.elapsed() < Duration::from_secs(3), "{name}: {:?}", start.elapsed());
+        assert_eq!(volume.size, [128, 128, 32], "{name}");
+        assert_sound(&volume, name);
+
+        let slice = 128 * 128;
+        let largest = volume.texels.iter().map(|texel| texel[3]).fold(0., f32::max);
+        match name {
+            "rocks" | "weave" => assert_eq!(largest, 1., "{name} is not solid"),
+            _ => assert!((0.1..0.98).contains(&largest), "{name}: alpha {largest}"),
+        }
+        let outer = &volume.texels[volume.texels.len() - slice..];
+        assert!(outer.iter().all(|texel| texel[3] < 0.01), "{name} is cut off by the outer surface");
+    }
+}
+
+/// A step from 0 to 1 over two voxels, as a smooth cubic, rises by at most 0.6875 from one texel to the next
+/// (from t = 1/4 to 3/4); a tenth more is left for distances that are first-order estimates.
+#[test]
+fn edges_are_soft() {
+    for name in NAMES {
+        let volume = shipped(name).build().unwrap();
+        for axis in 0..3 {
+            let steepest = (0..volume.size[axis] - 1)
+                .map(|index| step(&volume, axis, index, index + 1).1)
+                .fold(0., f64::max);
+            assert!(steepest < 0.76, "{name}: alpha rises by {steepest} along axis {axis}");
+        }
+    }
+}
+
+#[test]
+fn volumes_are_the_same_on_any_number_of_threads() {
+    for name in NAMES {
+        let once = small(name, "");
+        for threads in [1, 2, 4] {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            assert!(once == pool.install(|| small(name, "")), "{name} differs on {threads} threads");
+        }
+        assert!(once != small(name, "seed = 2"), "{name} has no seed");
+    }
+}
+
+/// Root mean square and largest difference of alpha between two layers across `axis`.
+fn step(volume: &Volume, axis: usize, from: u32, to: u32) -> (f64, f64) {
+    let size = volume.size.map(|n| n as usize);
+    let stride = size[..axis].iter().product::<usize>();
+    let (mut squares, mut largest, mut count) = (0., 0f64, 0);
+    for (index, texel) in volume.texels.iter().enumerate() {
+        if (index / stride) % size[axis] == from as usize {
+            let other = volume.texels[index + to as usize * stride - from as usize * stride];
+            let difference = f64::from(other[3] - texel[3]).abs();
+            squares += difference * difference;
+            largest = largest.max(difference);
+            count += 1;
+        }
+    }
+    ((squares / f64::from(count)).sqrt(), largest)
+}
+
+/// The step across the border, from layer `last` to layer 0, relative to the largest one inside.
+fn seam(volume: &Volume, axis: usize, last: u32) -> f64 {
+    let inside = (0..last).map(|index| step(volume, axis, index, index + 1).0).fold(0., f64::max);
+    step(volume, axis, last, 0).0 / inside
+}
+
+/// In a volume that repeats, the border is a step like any other and so, but for chance, not above the
+/// largest of the 127 others. A seam where unrelated layers meet is well above it: shown by a border in the
+/// wrong place.
+#[test]
+fn volumes_repeat_without_a_seam() {
+    for name in NAMES {
+        // Strands of about a voxel differ so much from texel to texel that no seam shows: thicker ones.
+        let keys = if name == "fur" { "thickness = 0.03\ndensity = 200" } else { "" };
+        let volume = recipe::parse("test", &format!("recipe = \"{name}\"\n{keys}")).unwrap().build().unwrap();
+        for axis in 0..2 {
+            let right = seam(&volume, axis, 127);
+            assert!(right <= 1.1, "{name}: a seam of {right} across axis {axis}");
+            let wrong = seam(&volume, axis, 70);
+            assert!(wrong > 1.5, "{name}: a border in the wrong place gives only {wrong} across axis {axis}");
+        }
+    }
+}
+
+#[test]
+fn hardly_any_texels_are_enough() {
+    for name in NAMES {
+        for size in [[1, 1, 1], [1, 7, 2], [5, 1, 1], [2, 3, 9]] {
+            assert_sound(&shipped(name).build_with_size(size).unwrap(), name);
+        }
+    }
+}
+
+#[test]
+fn extreme_keys_make_sound_volumes() {
+    for (name, keys) in [
+        ("fog", "depth = 100\nscale = 64\noctaves = 10\ncontrast = 1\nswirl = 2\nreach = 1\nheight = 4"),
+        ("fog", "depth = 0\nscale = 1\noctaves = 1\ncontrast = 0\nswirl = 0\nreach = 0.05\nheight = 0.01"),
+        ("clouds", "coverage = 1\ndepth = 200\nscale = 64\nbillows = 256\nsoftness = 1\nbottom = 0.9"),
+        ("clouds", "coverage = 0\ndepth = 0\nscale = 1\nbillows = 1\nsoftness = 0\nbottom = 0"),
+        (
+            "fur",
+            "density = 20000\nlength_variation = 1\nthickness = 0.05\ncurl = 0.2\nlean = 4\nclumping = 1",
+        ),
+        ("fur", "density = 0"),
+        (
+            "fur",
+            "length = 0.05\nthickness = 0.0005\ntaper = 1\ncurl = 0\nlean = 0\nclumps = 256\nopacity = 0.98",
+        ),
+        ("weave", "pairs = 256\nwidth = 1\nroundness = 1\ntwist = 256\nfibres = 1\nvariation = 1"),
+        ("weave", "pairs = 1\nwidth = 0.1\nroundness = 0.1\ntwist = 0\nheight = 0.01"),
+        (
+            "rocks",
+            "largest = 0.3\nsmallest = 0.005\noverlap = 0.9\nflatness = 0.9\nangularity = 1\nroughness = 0.5",
+        ),
+        ("rocks", "largest = 0.01\nsmallest = 0.3\nflatness = 0\nground = 0.9\nheight = 0.01"),
+        ("rocks", "throws = 0\nground = 0"),
+    ] {
+        assert_sound(&small(name, keys), &format!("{name}: {keys}"));
+    }
+}
+
+#[test]
+fn absurd_sizes_are_refused_before_anything_is_allocated() {
+    for size in ["[0, 128, 32]", "[128, 128, 0]", "[2147483648, 2147483648, 2147483648]", "[65536, 4097, 1]"]
+    {
+        assert_underlined("recipe = \"fog\"\nsize = ", size, "", "size");
+    }
+    let fog = shipped("fog");
+    for size in [[0, 1, 1], [1 << 31, 1 << 31, 1 << 31], [u32::MAX, 1, 1]] {
+        assert!(matches!(fog.build_with_size(size), Err(Error::Usage { .. })), "{size:?}");
+    }
+}
+
+/// Checks that `before + spot + after` is refused with a message that has `words`, and that the spot is
+/// what is underlined.
+fn assert_underlined(before: &str, spot: &str, after: &str, words: &str) {
+    let text = format!("{before}{spot}{after}");
+    match recipe::parse("nice.toml", &text) {
+        Err(Error::Text { span, message, .. }) => {
+            assert!(message.contains(words) && message.contains("nice.toml"), "{text}: {message}");
+            assert_eq!(&text[span.offset()..span.offset() + span.len()], spot, "{message}");
+        }
+        other => panic!("{text}: {other:?}"),
+    }
+}
+
+#[test]
+fn mistakes_are_underlined() {
+    let fur = "recipe = \"fur\"\nseed = 3\n";
+    assert_underlined(fur, "lenght", " = 0.5\n", "lenght");
+    assert_underlined(&format!("{fur}length = "), "1.5", "\ncurl = 0\n", "`length`: 1.5 is not in 0.05..=1");
+    assert_underlined(&format!("{fur}length = "), "nan", "", "`length`");
+    assert_underlined(&format!("{fur}length = "), "\"long\"", "", "`length`: invalid type");
+    assert_underlined(&format!("{fur}density = "), "-4", "", "`density`: invalid value");
+    assert_underlined(&format!("{fur}density = "), "1.5", "", "`density`");
+    assert_underlined(&format!("{fur}tip_colour = "), "\"gold\"", "", "`tip_colour`: `gold` is not a colour");
+    assert_underlined(&format!("{fur}height = "), "9", "", "`height`");
+    assert_underlined("recipe = ", "\"grass\"", "", "there is no recipe \"grass\"");
+    assert_underlined("recipe = \"fog\"\nsize = ", "[1, 2]", "", "`size`");
+    assert_underlined("recipe = \"fog\"\nseed = ", "-1", "", "`seed`");
+    assert_underlined("", "", "seed = 1", "`recipe`");
+}
+
+#[test]
+fn help_lists_the_keys_and_the_recipes() -> Result<()> {
+    let help = |text: &str| match recipe::parse("nice.toml", text) {
+        Err(Error::Text { help, .. }) => help.unwrap_or_default(),
+        other => panic!("{text}: {other:?}"),
+    };
+    assert!(help("recipe = \"fur\"\nhair = 1").contains("density"));
+    assert!(NAMES.iter().all(|name| help("recipe = \"\"").contains(name)));
+    assert!(matches!(recipe::load("no/such.toml"), Err(Error::Input { .. })));
+    Ok(())
+}

@@ -1,0 +1,645 @@
+//! The reference integrator against closed forms, against brute force, and against itself.
+#![allow(missing_docs, reason = "a test names itself")]
+
+use glam::{DMat3, DVec2, DVec3};
+use mesoshell::mesh::Mesh;
+use mesoshell::mesh::generate::{Generator, Plane, Sphere, Torus};
+use mesoshell::progress::{Interrupt, Progress, Silent};
+use mesoshell::reference::{Reference, Sample, TOLERANCE, render};
+use mesoshell::scene::{Camera, March, Medium, Scene, View};
+use mesoshell::shell::{Shell, ShellOptions};
+use mesoshell::volume::{Pyramid, Volume};
+use mesoshell::{Error, frame::Frame};
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg32;
+
+/// Side of the flat shell's square, and its thickness, in world units.
+const SIDE: f64 = 4.0;
+const THICKNESS: f64 = 0.5;
+const OPACITY_DISTANCE: f64 = 0.25;
+
+/// What rounding may add to [`TOLERANCE`]: a few dozen operations, on values of the order of 1.
+const ROUNDING: f64 = 1e-13;
+
+fn shell(generator: Generator, thickness: f64) -> Shell {
+    Shell::build(&generator.build().unwrap(), &ShellOptions::new(thickness)).unwrap()
+}
+
+fn flat_shell() -> Shell {
+    shell(Generator::Plane(Plane { size: SIDE, segments: 6 }), THICKNESS)
+}
+
+fn torus_shell() -> Shell {
+    shell(Generator::Torus(Torus { segments: 16, rings: 8, ..Torus::default() }), 0.2)
+}
+
+/// A volume one texel wide whose layers, from w = 0 up, are `[r, g, b, a]` premultiplied.
+fn layers(layers: &[[f32; 4]]) -> Volume {
+    Volume::new([1, 1, layers.len() as u32], layers.to_vec()).unwrap()
+}
+
+fn gray(alpha: f32) -> [f32; 4] {
+    [alpha, 0.5 * alpha, 0.0, alpha]
+}
+
+/// Independent texels: opacity up to `most`, of which a fifth is 0 and a fifth is `most`.
+fn noise(size: [u32; 3], most: f32) -> Volume {
+    let mut random = Pcg32::seed_from_u64(7);
+    let texel = |_| {
+        let alpha = (random.random_range(-0.33..1.33_f32)).clamp(0.0, 1.0) * most;
+        let mut color = || random.random_range(0.0..=1.0_f32) * alpha;
+        [color(), color(), color(), alpha]
+    };
+    Volume::new(size, (0..size.iter().product()).map(texel).collect()).unwrap()
+}
+
+fn level_zero(volume: Volume) -> Pyramid {
+    Pyramid { levels: vec![volume] }
+}
+
+fn view(eye: DVec3, target: DVec3, size: u32) -> View {
+    let camera = Camera { eye, target, up: DVec3::new(0.1, 0.2, -1.0), fov_y: 0.7, near: 1e-3 };
+    View { camera, width: size, height: size, depth: true }
+}
+
+/// Down on the flat shell, aslant.
+fn slanted_view() -> View {
+    view(DVec3::new(0.3, 2.0, 0.9), DVec3::new(0.05, 0.0, 0.02), 9)
+}
+
+fn scene(shell: Shell, volume: Pyramid, view: View) -> Scene {
+    let medium = Medium { opacity_distance: OPACITY_DISTANCE, lod_footprint: 0.0 };
+    Scene { shell, volume, medium, view, march: March::Default { step: 1.0 } }
+}
+
+fn centre(x: u32, y: u32) -> DVec2 {
+    DVec2::new(f64::from(x) + 0.5, f64::from(y) + 0.5)
+}
+
+/// Unit-depth directions of all pixels with their picture points.
+fn rays(view: &View) -> Vec<(DVec2, DVec3)> {
+    let points = (0..view.height).flat_map(|y| (0..view.width).map(move |x| centre(x, y)));
+    points.map(|point| (point, view.ray_at_unit_depth(point))).collect()
+}
+
+/// World units per world unit of height, of a ray through the flat shell.
+fn slant(direction: DVec3) -> f64 {
+    direction.length() / direction.y.abs()
+}
+
+fn error(a: &[f64; 4], b: &[f64; 4]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+}
+
+fn assert_close(found: f64, expected: f64, bound: f64) {
+    assert!((found - expected).abs() <= bound, "{found} for {expected}, more than {bound:e} apart");
+}
+
+/// The rays of a view through the flat shell: (slant, result), all of which must hit.
+fn through_flat(volume: Volume, view: &View) -> Vec<(f64, Sample)> {
+    let scene = scene(flat_shell(), level_zero(volume), *view);
+    let reference = Reference::new(&scene, view);
+    rays(view).into_iter().map(|(point, ray)| (slant(ray), reference.integrate_ray(point))).collect()
+}
+
+/// `integral of -ln(clear)` per unit length, where `clear` runs linearly between two values.
+fn mean_extinction(from: f64, to: f64) -> f64 {
+    let primitive = |x: f64| if x == 0.0 { 0.0 } else { x - x * x.ln() };
+    if from == to { -from.ln() } else { (primitive(to) - primitive(from)) / (to - from) }
+}
+
+#[test]
+fn a_constant_medium_in_a_flat_shell() {
+    let alpha = 0.3_f32;
+    let view = slanted_view();
+    for (slant, sample) in through_flat(layers(&[gray(alpha); 3]), &view) {
+        let sigma = -(1.0 - f64::from(alpha)).ln() / OPACITY_DISTANCE;
+        let length = THICKNESS * slant;
+        let total = 1.0 - (-sigma * length).exp();
+        assert_close(sample.rgba[3], total, TOLERANCE);
+        // The texel's colour is its f32 quotient: exactly 1, 1/2 and 0 here.
+        assert!(error(&sample.rgba, &[total, 0.5 * total, 0.0, total]) <= TOLERANCE);
+        // integral of T sigma s ds over 0..length, from where the ray enters.
+        let behind_entry = (1.0 / sigma) - length * (1.0 - total) / total;
+        let entry = (view.camera.eye.y - THICKNESS) * slant;
+        assert_close(sample.depth, entry + behind_entry, 10.0 * TOLERANCE / total);
+    }
+}
+
+/// The length of a ray in the shell around a closed mesh, from the boundary alone: depths where it
+/// leaves less depths where it enters, beyond `near`.
+fn length_by_boundary(shell: &Shell, eye: DVec3, direction: DVec3, near: f64) -> f64 {
+    let (mut sum, mut balance) = (0.0, 0.0);
+    for (t, neighbours) in shell.topology.neighbours.iter().enumerate() {
+        for face in (0..4).filter(|&face| neighbours[face] == mesoshell::shell::EXTERIOR) {
+            let [a, b, c] = shell.face(t, face).map(|id| shell.vertices[id as usize]);
+            // Moeller and Trumbore: eye + z direction = a + v (b - a) + w (c - a).
+            let system = DMat3::from_cols(b - a, c - a, -direction);
+            let solution = system.inverse() * (eye - a);
+            let is_hit = solution.x >= 0.0 && solution.y >= 0.0 && solution.x + solution.y <= 1.0;
+            if is_hit && solution.z > near {
+                let outwards = direction.dot((b - a).cross(c - a)).signum();
+                sum += outwards * solution.z;
+                balance += outwards;
+            }
+        }
+    }
+    (sum - balance * near) * direction.length()
+}
+
+#[test]
+fn a_constant_medium_in_bent_shells_seen_from_outside_and_inside() {
+    let alpha = 0.2_f32;
+    let sphere = shell(Generator::Sphere(Sphere { segments: 12, rings: 7, ..Sphere::default() }), 0.3);
+    for (shell, inside) in [(sphere, DVec3::new(0.0, 0.1, 1.1)), (torus_shell(), DVec3::new(1.45, 0.1, 0.1))]
+    {
+        for eye in [DVec3::new(0.4, 1.9, 2.9), inside, DVec3::new(0.02, 0.01, 0.03)] {
+            let view = view(eye, DVec3::new(0.1, 0.05, -0.2), 12);
+            let scene = scene(shell.clone(), level_zero(layers(&[gray(alpha)])), view);
+            let reference = Reference::new(&scene, &view);
+            let mut hits = 0;
+            for (point, direction) in rays(&view) {
+                let length = length_by_boundary(&shell, eye, direction, view.camera.near);
+                let total = 1.0 - (1.0 - f64::from(alpha)).powf(length / OPACITY_DISTANCE);
+                assert_close(reference.path_length(point), length, 1e-12);
+                assert_close(reference.integrate_ray(point).rgba[3], total, TOLERANCE + 1e-11);
+                hits += u32::from(length > 0.0);
+            }
+            assert!(hits > 40, "{hits} rays hit the shell from {eye}");
+        }
+    }
+}
+
+#[test]
+fn a_linear_density() {
+    let (low, high) = (0.15_f32, 0.85_f32);
+    for (slant, sample) in through_flat(layers(&[gray(low), gray(high)]), &slanted_view()) {
+        let [low, high] = [low, high].map(|alpha| 1.0 - f64::from(alpha));
+        // A quarter of the thickness is clamped at either end; half of it is the ramp.
+        let mean = 0.25 * -(low.ln() + high.ln()) + 0.5 * mean_extinction(low, high);
+        let total = 1.0 - (-mean * THICKNESS * slant / OPACITY_DISTANCE).exp();
+        assert!(error(&sample.rgba, &[total, 0.5 * total, 0.0, total]) <= TOLERANCE);
+    }
+}
+
+#[test]
+fn a_linear_colour_in_a_constant_medium() {
+    let alpha = 0.4_f32;
+    let volume = layers(&[[alpha, 0.0, 0.0, alpha], [0.0, 0.0, alpha, alpha]]);
+    for (slant, sample) in through_flat(volume, &slanted_view()) {
+        // In optical depth from the top: blue is 1 to q, falls to 0 at 3q, and stays there to 4q.
+        let q = -(1.0 - f64::from(alpha)).ln() * 0.25 * THICKNESS * slant / OPACITY_DISTANCE;
+        let blue = 1.0 - ((-q).exp() - (-3.0 * q).exp()) / (2.0 * q);
+        let total = 1.0 - (-4.0 * q).exp();
+        assert!(error(&sample.rgba, &[total - blue, 0.0, blue, total]) <= TOLERANCE);
+    }
+}
+
+#[test]
+fn one_opaque_plane_of_texels_is_a_singularity_and_not_a_wall() {
+    let (below, above) = (0.25_f32, 0.5_f32);
+    for (slant, sample) in through_flat(layers(&[gray(below), gray(1.0), gray(above)]), &slanted_view()) {
+        let [below, above] = [below, above].map(|alpha| 1.0 - f64::from(alpha));
+        let mean =
+            -(below.ln() + above.ln()) + 2.0 * (mean_extinction(below, 0.0) + mean_extinction(0.0, above));
+        let total = 1.0 - (-mean / 6.0 * THICKNESS * slant / OPACITY_DISTANCE).exp();
+        assert!(total < 0.9999);
+        assert!(error(&sample.rgba, &[total, 0.5 * total, 0.0, total]) <= TOLERANCE);
+    }
+}
+
+#[test]
+fn a_wall_behind_a_translucent_layer() {
+    let green = [0.0, 0.4, 0.0, 0.4_f32];
+    let volume = layers(&[[0.0, 0.0, 1.0, 1.0], [1.0, 0.0, 0.0, 1.0], green, green]);
+    let view = slanted_view();
+    for (slant, sample) in through_flat(volume, &view) {
+        // Down from the top: 3/8 of the thickness green, 1/4 from green to red, then the wall, red.
+        let scale = THICKNESS * slant / OPACITY_DISTANCE;
+        let first = -(1.0 - f64::from(green[3])).ln() * 0.375 * scale;
+        // On the ramp, at x of its length, red is x and alpha 0.4 + 0.6 x. With clear = 1 - alpha = y, and
+        // up to x depth(x) = (0.25 scale / 0.6) [y ln y - y] in the limits, C = integral of T sigma red / alpha dx:
+        // by the midpoint rule on 2^18 steps graded as x = 1 - (1 - t)^2 towards the singularity.
+        let ramp = 0.25 * scale;
+        let [base, rise] = [f64::from(green[3]), 1.0 - f64::from(green[3])];
+        let depth = |x: f64| first + ramp * x * mean_extinction(1.0 - base, (1.0 - x) * rise);
+        let steps = 1 << 18;
+        let red: f64 = (0..steps)
+            .map(|i| {
+                let rest = 1.0 - (f64::from(i) + 0.5) / f64::from(steps);
+                let x = 1.0 - rest * rest;
+                let extinction = -(rest * rest * rise).ln() * ramp;
+                2.0 * rest / f64::from(steps) * (-depth(x)).exp() * extinction * x / (base + rise * x)
+            })
+            .sum();
+        let red = red + (-depth(1.0)).exp();
+        // The midpoint rule errs by h^2 / 24 times the change of the slope, some tens: 1e-11.
+        assert!(error(&sample.rgba, &[red, 1.0 - red, 0.0, 1.0]) <= TOLERANCE + 1e-10, "{sample:?} {red}");
+    }
+    // A wall at the surface hides everything: its colour is that of the entry, exactly.
+    let wall = layers(&[green, green, [0.25, 0.5, 0.75, 1.0]]);
+    for (slant, sample) in through_flat(wall, &view) {
+        assert_eq!(sample.rgba, [0.25, 0.5, 0.75, 1.0]);
+        let entry = (view.camera.eye.y - THICKNESS) * slant;
+        assert_close(sample.depth, entry, ROUNDING);
+    }
+}
+
+#[test]
+fn empty_space_is_exactly_nothing_and_costs_nothing() {
+    let view = slanted_view();
+    let scene = scene(flat_shell(), level_zero(layers(&[[0.0; 4]; 4])), view);
+    let frame = render(&scene, &view, &Silent, &Interrupt::default()).unwrap();
+    assert!(frame.image.rgba.iter().all(|pixel| pixel.map(f32::to_bits) == [0; 4]));
+    assert!(frame.depth.unwrap().iter().all(|&depth| depth == f32::INFINITY));
+    assert_eq!(frame.report.counts["panels"], 0);
+    assert!(frame.report.counts["segments"] > 0);
+    assert_eq!(frame.report.counts["rays"], 81);
+}
+
+#[test]
+fn levels_of_detail_are_blended_along_the_ray() {
+    let [fine, coarse] = [0.3_f32, 0.6];
+    let level = |size: [u32; 3], alpha| {
+        Volume::new(size, vec![gray(alpha); size.iter().product::<u32>() as usize]).unwrap()
+    };
+    // Constant levels: only the level of detail varies, with depth. It goes from below 0 to above the last.
+    let volume = Pyramid { levels: vec![level([8, 8, 8], fine), level([4, 4, 4], coarse)] };
+    let view = view(DVec3::new(0.1, 1.4, 0.2), DVec3::new(0.8, 0.0, 0.1), 5);
+    let mut scene = scene(flat_shell(), volume, view);
+    // Texels per unit: 8 over the thickness, 8 over the side.
+    let pixel = 2.0 * (0.5 * view.camera.fov_y).tan() / 5.0;
+    let rho = 8.0 / THICKNESS;
+    // Level 0 ends at depth 1.
+    scene.medium.lod_footprint = 1.0 / (pixel * rho);
+    let reference = Reference::new(&scene, &view);
+    let mut blended = 0;
+    for (point, direction) in rays(&view) {
+        let [enter, exit] = [THICKNESS, 0.0].map(|y| (y - view.camera.eye.y) / direction.y);
+        let sigma = |z: f64| {
+            let part = z.log2().clamp(0.0, 1.0);
+            -(1.0 - (f64::from(fine) * (1.0 - part) + f64::from(coarse) * part)).ln()
+        };
+        // Simpson's rule, between the kinks at depths 1 and 2.
+        let simpson = |from: f64, to: f64| {
+            let steps = 1000;
+            let h = (to - from) / f64::from(steps);
+            let at = |i: i32| sigma(from + h * f64::from(i));
+            let inner: f64 = (1..steps).map(|i| f64::from(2 + 2 * (i % 2)) * at(i)).sum();
+            h / 3.0 * (at(0) + inner + at(steps))
+        };
+        let cuts = [enter, 1.0_f64.clamp(enter, exit), 2.0_f64.clamp(enter, exit), exit];
+        let depth: f64 = cuts.windows(2).map(|cut| simpson(cut[0], cut[1])).sum();
+        let total = 1.0 - (-depth * direction.length() / OPACITY_DISTANCE).exp();
+        // Simpson errs by h^4 (to - from) / 180 times a fourth derivative of a few tens: below 1e-12.
+        assert!(
+            error(&reference.integrate_ray(point).rgba, &[total, 0.5 * total, 0.0, total]) <= 2.0 * TOLERANCE
+        );
+        blended += usize::from(enter < 2.0 && exit > 1.0);
+    }
+    assert_eq!(blended, 25);
+}
+
+#[test]
+fn the_near_plane_is_a_depth_and_not_a_distance() {
+    let alpha = 0.3_f32;
+    let mut view = view(DVec3::new(0.0, 0.4, 0.1), DVec3::new(0.1, 0.0, 0.0), 7);
+    view.camera.near = 0.1;
+    for (i, (slant, sample)) in through_flat(layers(&[gray(alpha)]), &view).into_iter().enumerate() {
+        let direction = rays(&view)[i].1;
+        let length = view.camera.eye.y * slant - view.camera.near * direction.length();
+        let total = 1.0 - (1.0 - f64::from(alpha)).powf(length / OPACITY_DISTANCE);
+        assert_close(sample.rgba[3], total, TOLERANCE);
+    }
+}
+
+#[test]
+fn rays_in_shared_faces_and_along_edges_count_once() {
+    // Straight down on the grid's middle vertex: the middle pixel looks along a prism edge, its row and column (and
+    // diagonal, turned by 45 degrees) along prism sides.
+    for turn in [0.0, 0.25, 0.5, 0.75, 1.0_f64].map(|half_turns| half_turns * std::f64::consts::PI) {
+        for eye in [DVec3::new(0.0, 2.0, 0.0), DVec3::new(SIDE / 6.0, 1.7, -SIDE / 6.0)] {
+            let mut view = view(eye, DVec3::new(eye.x, 0.0, eye.z), 9);
+            view.camera.up = DVec3::new(turn.sin(), 0.0, turn.cos());
+            let scene = scene(flat_shell(), level_zero(layers(&[gray(0.5)])), view);
+            let reference = Reference::new(&scene, &view);
+            for (point, direction) in rays(&view) {
+                assert_close(reference.path_length(point), THICKNESS * slant(direction), 1e-12);
+            }
+        }
+    }
+}
+
+#[test]
+fn inverted_cells_are_solids_too() {
+    let mut mesh = Generator::Plane(Plane { size: SIDE, segments: 6 }).build().unwrap();
+    mesh.normals.iter_mut().for_each(|normal| *normal = -*normal);
+    let shell = Shell::build(&mesh, &ShellOptions::new(THICKNESS)).unwrap();
+    assert_eq!(shell.health.inverted, shell.health.tetrahedra);
+    let view = slanted_view();
+    let volume = layers(&[gray(0.2), gray(0.7)]);
+    let scene = scene(shell, level_zero(volume.clone()), view);
+    let reference = Reference::new(&scene, &view);
+    // The same medium upside down: a different path through it, of the same optical depth.
+    for ((point, _), (_, upright)) in rays(&view).into_iter().zip(through_flat(volume, &view)) {
+        assert_close(reference.integrate_ray(point).rgba[3], upright.rgba[3], 2.0 * TOLERANCE);
+    }
+}
+
+#[test]
+fn cells_without_volume_add_nothing() {
+    let mesh = Generator::Plane(Plane { size: SIDE, segments: 6 }).build().unwrap();
+    let mut options = ShellOptions::new(THICKNESS);
+    // Nothing above the left half: its cells, and some of those at its border, are flat.
+    options.thickness_scale = mesh.positions.iter().map(|p| f64::from(u8::from(p.x > 0.1))).collect();
+    let shell = Shell::build(&mesh, &options).unwrap();
+    assert!(shell.health.zero_volume > 36);
+    let view = view(DVec3::new(0.0, 3.0, 0.0), DVec3::ZERO, 12);
+    let scene = scene(shell, level_zero(layers(&[gray(0.5)])), view);
+    let reference = Reference::new(&scene, &view);
+    let ground = |direction: DVec3| view.camera.eye - direction * (view.camera.eye.y / direction.y);
+    let (mut empty, mut full) = (0, 0);
+    for (point, direction) in rays(&view) {
+        let (length, ground) = (reference.path_length(point), ground(direction));
+        // The first column of vertices of full thickness stands at SIDE / 6; the ray leans outwards.
+        if ground.x < 0.0 {
+            assert_eq!(length, 0.0);
+            empty += 1;
+        } else if ground.x * (1.0 - THICKNESS / 3.0) > SIDE / 6.0 {
+            assert_close(length, THICKNESS * slant(direction), 1e-12);
+            full += 1;
+        }
+    }
+    assert!(empty > 40 && full > 10, "{empty} {full}");
+}
+
+#[test]
+fn media_that_overlap_add() {
+    let low = Generator::Plane(Plane { size: SIDE, segments: 3 }).build().unwrap();
+    let mut mesh = low.clone();
+    let count = low.positions.len() as u32;
+    mesh.positions.extend(low.positions.iter().map(|p| *p + DVec3::new(0.0, 0.5 * THICKNESS, 0.0)));
+    mesh.normals.extend(&low.normals);
+    mesh.triangles.extend(low.triangles.iter().map(|t| t.map(|id| id + count)));
+    mesh.uvs.extend(&low.uvs);
+    let shell = Shell::build(&mesh, &ShellOptions::new(THICKNESS)).unwrap();
+    let view = slanted_view();
+    let mut scene = scene(shell, level_zero(layers(&[gray(0.4)])), view);
+    let reference = Reference::new(&scene, &view);
+    for (point, direction) in rays(&view) {
+        let length = 2.0 * THICKNESS * slant(direction);
+        assert_close(reference.path_length(point), length, 1e-12);
+        let total = 1.0 - 0.6_f64.powf(length / OPACITY_DISTANCE);
+        // The texel is the f32 next to 0.4.
+        assert_close(reference.integrate_ray(point).rgba[3], total, TOLERANCE + f64::from(f32::EPSILON));
+    }
+    // Walls hide across media: the upper shell is opaque from its upper texel down, and comes first.
+    scene.volume = level_zero(layers(&[gray(0.4), gray(1.0)]));
+    let reference = Reference::new(&scene, &view);
+    assert_eq!(reference.pixel(4, 4).rgba, [1.0, 0.5, 0.0, 1.0]);
+}
+
+/// Vulkan's linear filter, straight from its definition.
+fn filtered(volume: &Volume, texture: DVec3) -> [f64; 4] {
+    let size = volume.size.map(i64::from);
+    let mut sum = [0.0; 4];
+    let place: [f64; 3] = std::array::from_fn(|i| texture[i] * size[i] as f64 - 0.5);
+    for corner in 0..8 {
+        let mut weight = 1.0;
+        let mut texel = [0; 3];
+        for i in 0..3 {
+            let (low, far) = (place[i].floor(), corner >> i & 1);
+            let part = place[i] - low;
+            weight *= if far == 1 { part } else { 1.0 - part };
+            let index = low as i64 + far;
+            texel[i] = if i == 2 { index.clamp(0, size[i] - 1) } else { index.rem_euclid(size[i]) } as u32;
+        }
+        for (sum, value) in sum.iter_mut().zip(volume.texel(texel)) {
+            *sum += weight * f64::from(value);
+        }
+    }
+    sum
+}
+
+/// The midpoint rule on `steps` equal steps of depth, tetrahedra found by trial.
+fn brute_force(scene: &Scene, view: &View, direction: DVec3, range: [f64; 2], steps: u32) -> [f64; 4] {
+    let shell = &scene.shell;
+    let size = scene.volume.levels[0].size.map(f64::from);
+    let pixel = view.pixel_at_unit_depth();
+    let (mut color, mut depth) = ([0.0; 4], 0.0_f64);
+    let dz = (range[1] - range[0]) / f64::from(steps);
+    let ds = dz * direction.length() / scene.medium.opacity_distance;
+    let mut candidates: Vec<usize> = (0..shell.cells.len()).collect();
+    candidates.retain(|&t| {
+        // Tetrahedra whose bounding sphere the ray meets.
+        let vertices = shell.vertices_of(t);
+        let middle = vertices.iter().sum::<DVec3>() / 4.0;
+        let radius = vertices.iter().map(|v| v.distance(middle)).fold(0.0, f64::max);
+        (middle - view.camera.eye).reject_from(direction).length() <= radius
+    });
+    for i in 0..steps {
+        let z = range[0] + (f64::from(i) + 0.5) * dz;
+        let point = view.camera.eye + z * direction;
+        for &t in &candidates {
+            let b = shell.barycentric(t, point);
+            if b.iter().any(|&b| b < 0.0) {
+                continue;
+            }
+            let texture = (0..4).map(|k| b[k] * shell.texture[t][k]).sum();
+            let map = shell.cells[t].texture_from_world.transpose();
+            let rho = (0..3).map(|i| size[i] * map.col(i).length()).fold(0.0, f64::max);
+            let last = scene.volume.levels.len() - 1;
+            let lod = (scene.medium.lod_footprint * z * pixel * rho).log2().clamp(0.0, last as f64);
+            let level = (lod as usize).min(last);
+            let [fine, coarse] =
+                [level, (level + 1).min(last)].map(|level| filtered(&scene.volume.levels[level], texture));
+            let part = lod - level as f64;
+            let [r, g, b, a]: [f64; 4] = std::array::from_fn(|c| fine[c] * (1.0 - part) + coarse[c] * part);
+            let step = -(-a).ln_1p() * ds;
+            if a > 0.0 {
+                let seen = (-depth).exp() * -(-step).exp_m1();
+                for (sum, premultiplied) in color.iter_mut().zip([r, g, b, a]) {
+                    *sum += seen * premultiplied / a;
+                }
+            }
+            depth += step;
+        }
+    }
+    color
+}
+
+#[test]
+fn brute_force_agrees_on_noise_in_a_bent_shell() {
+    let view = view(DVec3::new(0.4, 2.4, 2.3), DVec3::new(0.5, 0.0, 0.3), 3);
+    let mut scene = scene(torus_shell(), Pyramid::build(noise([6, 6, 3], 0.9)), view);
+    for footprint in [0.0, 40.0] {
+        scene.medium.lod_footprint = footprint;
+        let reference = Reference::new(&scene, &view);
+        let mut opaque = 0.0_f64;
+        for (point, direction) in rays(&view) {
+            let found = reference.integrate_ray(point).rgba;
+            let run = |steps| brute_force(&scene, &view, direction, [1.0, 5.5], steps);
+            let [coarse, fine] = [run(10_000), run(40_000)];
+            // Steps that straddle the end of a tetrahedron err by the first order, the others by the second: of two
+            // runs, one four times finer than the other, the finer is off by a third of their difference or less
+            // in the mean; ends fall randomly in a step, so three times that is allowed.
+            let h = 4.5 / 40_000.0 * direction.length();
+            let one_end = -(0.1_f64).ln() * h / OPACITY_DISTANCE;
+            assert!(error(&coarse, &fine) <= 8.0 * one_end);
+            assert!(error(&found, &fine) <= one_end, "{found:?} {fine:?} {one_end}");
+            opaque = opaque.max(found[3]);
+        }
+        assert!(opaque > 0.5);
+    }
+}
+
+#[test]
+fn brute_force_agrees_on_noise_in_a_flat_shell() {
+    let volume = noise([5, 4, 6], 0.95);
+    let view = slanted_view();
+    let scene = scene(flat_shell(), level_zero(volume.clone()), view);
+    let reference = Reference::new(&scene, &view);
+    for (point, direction) in rays(&view).into_iter().step_by(5) {
+        // Neither shell nor tetrahedra: texture coordinates from the plane's own map.
+        let run = |steps: u32| {
+            let length = THICKNESS * slant(direction);
+            let ds = length / f64::from(steps);
+            let (mut color, mut depth) = ([0.0; 4], 0.0_f64);
+            for i in 0..steps {
+                let y = THICKNESS * (1.0 - (f64::from(i) + 0.5) / f64::from(steps));
+                let p = view.camera.eye + direction * ((y - view.camera.eye.y) / direction.y);
+                let texture = DVec3::new(p.x / SIDE + 0.5, 0.5 - p.z / SIDE, y / THICKNESS);
+                let [r, g, b, a] = filtered(&volume, texture);
+                let step = -(-a).ln_1p() * ds / OPACITY_DISTANCE;
+                let seen = (-depth).exp() * -(-step).exp_m1();
+                if a > 0.0 {
+                    for (sum, premultiplied) in color.iter_mut().zip([r, g, b, a]) {
+                        *sum += seen * premultiplied / a;
+                    }
+                }
+                depth += step;
+            }
+            color
+        };
+        // The midpoint rule is of second order, across the kinks at texel planes too: the error of the finer run is a
+        // third of the difference; kinks fall anywhere in a step, which triples it at most.
+        let [coarse, fine] = [run(20_000), run(40_000)];
+        let bound = error(&coarse, &fine) + 2.0 * TOLERANCE;
+        assert!(bound < 1e-7, "{bound:e}");
+        let found = reference.integrate_ray(point).rgba;
+        assert!(error(&found, &fine) <= bound, "{found:?} {fine:?} {bound:e}");
+    }
+}
+
+#[test]
+fn tolerances_are_kept_on_noise_with_opaque_texels() {
+    let view = view(DVec3::new(0.5, 2.0, 2.2), DVec3::new(0.4, 0.0, 0.3), 24);
+    let mut scene = scene(torus_shell(), Pyramid::build(noise([9, 7, 5], 1.0)), view);
+    for footprint in [0.0, 20.0] {
+        scene.medium.lod_footprint = footprint;
+        let at = |tolerance| {
+            let reference = Reference::new(&scene, &view).with_tolerance(tolerance);
+            rays(&view).into_iter().map(|(point, _)| reference.integrate_ray(point)).collect::<Vec<_>>()
+        };
+        let exact = at(1e-12);
+        let covered = exact.iter().filter(|sample| sample.rgba[3] > 0.1).count();
+        assert!(covered > 200, "{covered}");
+        for tolerance in [1e-4, 1e-6, TOLERANCE, 1e-11] {
+            let worst =
+                at(tolerance).iter().zip(&exact).map(|(a, b)| error(&a.rgba, &b.rgba)).fold(0.0, f64::max);
+            assert!(worst <= tolerance, "{worst:e} at {tolerance:e}");
+        }
+        // Another medium, by a ten-millionth, is told apart.
+        let mut other = scene.clone();
+        other.medium.opacity_distance *= 1.0 + 1e-7;
+        let other = Reference::new(&other, &view);
+        let pixels = rays(&view).into_iter().zip(&exact);
+        let differences = pixels.map(|((point, _), b)| error(&other.integrate_ray(point).rgba, &b.rgba));
+        assert!(differences.fold(0.0, f64::max) > 10.0 * TOLERANCE);
+    }
+}
+
+fn moved(mesh: &Mesh, scale: f64, offset: DVec3) -> Mesh {
+    let mut mesh = mesh.clone();
+    mesh.positions.iter_mut().for_each(|p| *p = *p * scale + offset);
+    mesh
+}
+
+#[test]
+fn place_and_scale_do_not_matter() {
+    let mesh = Generator::Torus(Torus { segments: 16, rings: 8, ..Torus::default() }).build().unwrap();
+    let volume = Pyramid::build(noise([8, 8, 4], 0.9));
+    let picture = |scale: f64, offset: DVec3| {
+        let shell = Shell::build(&moved(&mesh, scale, offset), &ShellOptions::new(0.2 * scale)).unwrap();
+        let eye = DVec3::new(0.5, 2.0, 2.2) * scale + offset;
+        let mut view = view(eye, DVec3::new(0.5, 0.0, 0.25) * scale + offset, 12);
+        view.camera.near *= scale;
+        let mut scene = scene(shell, volume.clone(), view);
+        scene.medium = Medium { opacity_distance: 0.05 * scale, lod_footprint: 1.0 };
+        let reference = Reference::new(&scene, &view);
+        rays(&view).into_iter().map(|(point, _)| reference.integrate_ray(point).rgba).collect::<Vec<_>>()
+    };
+    let worst =
+        |a: &[[f64; 4]], b: &[[f64; 4]]| a.iter().zip(b).map(|(a, b)| error(a, b)).fold(0.0, f64::max);
+    let plain = picture(1.0, DVec3::ZERO);
+    for scale in [1e-6, 1e6] {
+        assert!(worst(&plain, &picture(scale, DVec3::ZERO)) < 2.0 * TOLERANCE);
+    }
+    // At 1e6 a coordinate is rounded by 6e-11; the sine of a grazing face, the slope of the
+    // texture (4 texels on a thickness of 0.2, extinction up to 2.3 / 0.05 a unit) and the eye's own three
+    // coordinates enlarge that by some hundreds.
+    let far = DVec3::new(1e6, -1e6, 1e6);
+    let shift = worst(&plain, &picture(1.0, far));
+    assert!(shift < 6e-8, "{shift:e}");
+    assert!(worst(&plain, &picture(1.0 + 1e-6, far)) > 0.0);
+}
+
+/// Hears whether the run was told of to its end.
+#[derive(Default)]
+struct Last(std::sync::Mutex<f64>);
+
+impl Progress for Last {
+    fn stage(&self, _name: &str) {
+        *self.0.lock().unwrap() = 0.0;
+    }
+    fn fraction(&self, done: f64) {
+        let mut last = self.0.lock().unwrap();
+        *last = last.max(done);
+    }
+}
+
+#[test]
+fn threads_do_not_matter_and_the_frame_is_what_pixels_say() {
+    let view = View { width: 16, ..view(DVec3::new(0.5, 2.0, 2.2), DVec3::new(0.5, 0.0, 0.3), 12) };
+    let scene = scene(torus_shell(), Pyramid::build(noise([8, 8, 4], 1.0)), view);
+    let last = Last::default();
+    let on = |threads| -> Frame {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| render(&scene, &view, &last, &Interrupt::default())).unwrap()
+    };
+    let (one, three) = (on(1), on(3));
+    assert_eq!(*last.0.lock().unwrap(), 1.0);
+    let bits = |frame: &Frame| frame.image.rgba.iter().flatten().map(|c| c.to_bits()).collect::<Vec<_>>();
+    assert_eq!(bits(&one), bits(&three));
+    assert_eq!(one.depth, three.depth);
+    assert_eq!(one.report.counts, three.report.counts);
+    let reference = Reference::new(&scene, &view);
+    for y in 0..view.height {
+        for x in 0..view.width {
+            let index = (y * view.width + x) as usize;
+            assert_eq!(one.image.rgba[index], reference.pixel(x, y).rgba.map(|c| c as f32));
+        }
+    }
+    let covered = one.image.rgba.iter().filter(|pixel| pixel[3] > 0.0).count() as u64;
+    assert_eq!(one.report.counts["pixels_covered"], covered);
+    assert!(covered > 50 && covered < 192);
+}
+
+#[test]
+fn an_interrupt_is_heard() {
+    let view = slanted_view();
+    let scene = scene(flat_shell(), level_zero(layers(&[gray(0.5)])), view);
+    let interrupt = Interrupt::default();
+    interrupt.set();
+    assert!(matches!(render(&scene, &view, &Silent, &interrupt), Err(Error::Interrupted)));
+}
