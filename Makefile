@@ -6,6 +6,7 @@ CARGO ?= cargo
 
 demo: setup
 	$(CARGO) build --release
+	@mkdir -p out
 	target/release/mesoshell render scenes/fur-sphere.toml -o out/fur-sphere.png
 	@echo "the picture is in out/fur-sphere.png"
 

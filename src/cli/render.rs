@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser};
-use mesoshell::frame::{Image, Report, Stage, Stopwatch, file};
+use mesoshell::frame::{Report, Stage, Stopwatch, file};
 use mesoshell::gpu::{DeviceChoice, Messages};
 use mesoshell::method::{self, METHODS, Setup};
 use mesoshell::progress::{Interrupt, Progress};
@@ -107,27 +107,13 @@ fn render(arguments: &Arguments, progress: &Arc<dyn Progress>, interrupt: &Inter
 
     progress.stage("writing the picture");
     let mut watch = Stopwatch::start();
-    if let Some(background) = background {
-        lay_on(&mut frame.image, background);
-    }
-    file::write(&output, &frame.image)?;
+    file::write(&output, &frame.image, background)?;
     watch.lap("write");
     stages.append(&mut frame.report.stages);
     stages.extend(watch.finish());
     frame.report.stages = stages;
     let View { width, height, .. } = view;
     Ok(Rendered { scene: scene.clone(), output, width, height, report: frame.report })
-}
-
-/// Lays a picture on an opaque background, linear RGB.
-fn lay_on(image: &mut Image, background: [f32; 3]) {
-    for pixel in &mut image.rgba {
-        let transmittance = 1.0 - pixel[3];
-        for (channel, behind) in pixel.iter_mut().zip(background) {
-            *channel += transmittance * behind;
-        }
-        pixel[3] = 1.0;
-    }
 }
 
 /// Lets the first Ctrl-C or SIGTERM end the run at its next check, and the second one at once.
