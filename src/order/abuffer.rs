@@ -14,7 +14,7 @@
 //!   in front of the eye are met (the near plane plays no part);
 //! - runs may overlap where the shell overlaps itself: a tetrahedron is related to every entry
 //!   until a run that began after it must have ended;
-//! - samples stand [`NUDGE`] off the pixel centres: a symmetric scene sends rays exactly through edges and
+//! - samples stand 1e-10 pixels off the pixel centres: a symmetric scene sends rays exactly through edges and
 //!   vertices, where rounding would decide on its own which faces are met, and in which order.
 //!
 //! Inverse depth is used for depth: it is linear in pixel coordinates over a plane.
@@ -129,7 +129,7 @@ fn projected_range(corners: &[DVec3; 3], axis: usize, pixel: f64) -> (f64, f64) 
 }
 
 impl Footprint {
-    /// `None` where the face meets no pixel centre for sure.
+    /// `None` where the face surely meets no sample.
     /// `vertices` are relative to the eye: right, down, into the picture.
     fn new(face: &BoundaryFace, vertices: &[DVec3], raster: Raster) -> Option<Self> {
         let [p, q, r] = face.vertices.map(|v| vertices[v as usize]);
@@ -168,7 +168,7 @@ impl Footprint {
         }
         let span = Raster::indices(low, high, raster.width);
         let mut start = span.start.max(self.columns.start) as usize;
-        let mut end = span.end.min(self.columns.end) as usize;
+        let mut end = (span.end.min(self.columns.end) as usize).max(start);
         // The crossings are rounded; the edge functions decide. Each is monotonic in the column even as
         // rounded, so what is covered is an interval, and only its ends need to be tried.
         let covers = |x: usize| {
@@ -367,4 +367,72 @@ fn sort_front_to_back(list: &mut [Fragment]) {
     list.sort_unstable_by(|a, b| {
         b.inverse_depth.total_cmp(&a.inverse_depth).then(a.crossing.cmp(&b.crossing))
     });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::Camera;
+
+    /// The pairs of a stack of faces on the axis, each given as `(depth, tetrahedron, leaves)`.
+    fn pairs_of(stack: &[(f64, u32, bool)]) -> Vec<[u32; 2]> {
+        let mut list: Vec<Fragment> = stack
+            .iter()
+            .map(|&(depth, cell, leaves)| {
+                let face = BoundaryFace { vertices: [0; 3], cell, leaves, eye_side: 1 };
+                Fragment { inverse_depth: depth.recip(), crossing: Crossing::new(&face), next: NONE }
+            })
+            .collect();
+        sort_front_to_back(&mut list);
+        let last_front = vec![NONE; stack.len()];
+        let mut scratch = Scratch { heads: vec![], fragments: vec![], list, left: vec![], last_front };
+        let mut pairs = vec![];
+        scratch.follow_ray(&mut pairs);
+        pairs
+    }
+
+    #[test]
+    fn what_a_ray_leaves_is_in_front_of_what_it_enters_next() {
+        let outside = [(1.0, 0, false), (2.0, 1, true), (3.0, 2, false), (4.0, 3, true), (5.0, 4, false)];
+        assert_eq!(pairs_of(&outside), [[1, 2], [3, 4]]);
+        let inside = [(1.0, 0, true), (2.0, 1, false), (3.0, 2, true)];
+        assert_eq!(pairs_of(&inside), [[0, 1]]);
+        let in_one_place = [(2.0, 1, false), (2.0, 0, true), (1.0, 2, false), (3.0, 3, true)];
+        assert_eq!(pairs_of(&in_one_place), [[0, 1]]);
+    }
+
+    #[test]
+    fn runs_that_overlap_follow_all_that_ended_before_them() {
+        // A run ends with 0; then the runs 1..3 and 2..4 overlap, and run 5 follows both.
+        let stack = [
+            (0.5, 6, false),
+            (1.0, 0, true),
+            (2.0, 1, false),
+            (3.0, 2, false),
+            (4.0, 3, true),
+            (5.0, 4, true),
+            (6.0, 5, false),
+            (7.0, 5, true),
+        ];
+        assert_eq!(pairs_of(&stack), [[0, 1], [0, 2], [3, 5], [4, 5]]);
+    }
+
+    #[test]
+    fn faces_that_reach_behind_the_eye_cover_what_their_part_in_front_projects_to() {
+        let camera = Camera { eye: DVec3::ZERO, target: -DVec3::Z, up: DVec3::Y, fov_y: 1.2, near: 0.1 };
+        let view = View { camera, width: 40, height: 30, depth: false };
+        let raster = Raster { width: 40, height: 30, pixel: view.pixel_at_unit_depth() };
+        // A floor below the eye, from far in front to far behind: it covers just the lower half.
+        let corners = [DVec3::new(0.0, 1.0, 1e6), DVec3::new(1e7, 1.0, -1e6), DVec3::new(-1e7, 1.0, -1e6)];
+        let orientation = corners[0].dot(corners[1].cross(corners[2]));
+        let eye_side = if orientation > 0.0 { 1 } else { -1 };
+        let face = BoundaryFace { vertices: [0, 1, 2], cell: 0, leaves: false, eye_side };
+        let footprint = Footprint::new(&face, &corners, raster).unwrap();
+        for y in 0..30 {
+            let covered = footprint.covered(y, raster);
+            assert_eq!(covered.len(), if y < 15 { 0 } else { 40 }, "row {y}");
+        }
+        let behind = corners.map(|corner| corner * DVec3::new(1.0, 1.0, 0.0) - DVec3::Z);
+        assert!(Footprint::new(&face, &behind, raster).is_none());
+    }
 }
