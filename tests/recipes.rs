@@ -86,9 +86,9 @@ fn step(volume: &Volume, axis: usize, from: u32, to: u32) -> (f64, f64) {
     let size = volume.size.map(|n| n as usize);
     let stride = size[..axis].iter().product::<usize>();
     let (mut squares, mut largest, mut count) = (0., 0f64, 0);
-    for (index, texel) in volume.texels.iter().enumerate() {
-        if (index / stride) % size[axis] == from as usize {
-            let other = volume.texels[index + to as usize * stride - from as usize * stride];
+    for block in volume.texels.chunks_exact(stride * size[axis]) {
+        let layer = |index: u32| block.chunks_exact(stride).nth(index as usize).unwrap();
+        for (texel, other) in layer(from).iter().zip(layer(to)) {
             let difference = f64::from(other[3] - texel[3]).abs();
             squares += difference * difference;
             largest = largest.max(difference);
