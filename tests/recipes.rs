@@ -140,7 +140,7 @@ fn extreme_keys_make_sound_volumes() {
         ("clouds", "coverage = 0\ndepth = 0\nscale = 1\nbillows = 1\nsoftness = 0\nbottom = 0"),
         (
             "fur",
-            "density = 20000\nlength_variation = 1\nthickness = 0.05\ncurl = 0.2\nlean = 4\nclumping = 1",
+            "density = 2000\nlength_variation = 1\nthickness = 0.05\ncurl = 0.2\nlean = 4\nclumping = 1",
         ),
         ("fur", "density = 0"),
         (
