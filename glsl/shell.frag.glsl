@@ -1,12 +1,12 @@
 #version 450
 #extension GL_ARB_shading_language_include : require
 // variant: shell_depth DEPTH
-// Marches one ray segment, from where the ray entered a tetrahedron to where it leaves it (this fragment).
-// Dufort, Leblanc, Poulin 2005, sections 4.2 and 4.3, with two changes. Exit faces are drawn instead of entry faces, so
-// that an eye inside a tetrahedron needs no case of its own. And the entry is not interpolated but found
-// per pixel from interpolated barycentric coordinates, which are exact under perspective: along the ray
-// from the exit (s = 0) to the eye (s = 1) a barycentric coordinate runs linearly from b to e, and the ray entered where
-// the first of them becomes zero, at s = b / (b - e). No difference of nearly equal lengths is taken.
+// Marches the segment of one ray in one tetrahedron.
+// Dufort, Leblanc, Poulin 2005, sections 4.2 and 4.3, with one change: entry and exit are not interpolated over the
+// front faces but found per pixel from the four planes (Cyrus-Beck clipping), so that the rasteriser's snapping of vertices
+// does not move them. Two cells that share a face hold the same plane, negated: one leaves at the very depth, bit for bit,
+// at which the other is entered. An outline that covers a little too much costs a fragment and changes nothing, and an
+// eye inside the tetrahedron is no case of its own.
 
 #include "shell.glsl"
 #include "medium.glsl"
@@ -14,14 +14,11 @@
 layout(constant_id = 0) const bool PAPER_PLAN = false;
 layout(constant_id = 1) const bool MINIFIED = true; // whether any level but 0 can be needed
 
-layout(set = 0, binding = 4) uniform sampler3D volume; // premultiplied
+layout(set = 0, binding = 1) uniform sampler3D volume; // premultiplied
 
-layout(location = 0) in vec3 exit_view;
-layout(location = 1) in vec3 exit_texture;
-layout(location = 2) in vec3 exit_barycentric;
-layout(location = 3) flat in vec3 eye_barycentric;
-layout(location = 4) flat in vec3 eye_texture;
-layout(location = 5) flat in float texels_per_unit;
+layout(location = 0) flat in vec4 planes[4];
+layout(location = 4) flat in vec4 texture_rows[3];
+layout(location = 7) flat in float texels_per_unit;
 
 layout(location = 0) out vec4 out_rgba; // premultiplied
 #ifdef DEPTH
@@ -42,39 +39,44 @@ vec4 fetch(vec3 texture_point, float depth) {
 }
 
 void main() {
-    // The near plane cuts the segment at depth `near`.
-    float s_entry = 1.0 - view.near / exit_view.z;
-    for (int i = 0; i < 3; i++) {
-        float b = max(exit_barycentric[i], 0.0);
-        float e = eye_barycentric[i];
-        if (e < 0.0) s_entry = min(s_entry, b / (b - e));
+    // The ray, at depth 1; image rows run down.
+    vec3 ray = vec3((gl_FragCoord.xy - view.centre) * vec2(view.pixel, -view.pixel), 1.0);
+    float entry = view.near; // depths
+    float exit = 3.0e38;
+    for (int i = 0; i < 4; i++) {
+        float towards_inside = dot(planes[i].xyz, ray);
+        float depth = planes[i].w / towards_inside;
+        if (towards_inside > 0.0) entry = max(entry, depth);
+        else if (towards_inside < 0.0) exit = min(exit, depth);
+        else if (planes[i].w > 0.0) exit = entry; // parallel to the face, and outside
     }
-    float exit_distance = length(exit_view);
-    float segment = exit_distance * s_entry; // world units
-    if (!(segment > 0.0)) discard;
+    if (!(exit > entry)) discard;
 
-    vec3 eye_from_exit_texture = eye_texture - exit_texture;
+    float ray_length = length(ray);
+    vec3 texture_from_depth = vec3(dot(texture_rows[0].xyz, ray), dot(texture_rows[1].xyz, ray), dot(texture_rows[2].xyz, ray));
+    vec3 texture_at_eye = vec3(texture_rows[0].w, texture_rows[1].w, texture_rows[2].w);
     uint count = view.samples;
     if (!PAPER_PLAN) {
-        float texel = MINIFIED ? exp2(floor(level_of_detail(exit_view.z * (1.0 - 0.5 * s_entry)))) : 1.0;
-        float texels = length(eye_from_exit_texture * view.texels) * s_entry / texel;
+        float texel = MINIFIED ? exp2(floor(level_of_detail(0.5 * (entry + exit)))) : 1.0;
+        float texels = length(texture_from_depth * view.texels) * (exit - entry) / texel;
         count = uint(clamp(ceil(texels / view.step), 1.0, 65536.0));
     }
-    float depth_per_alpha = segment / float(count) * view.per_opacity_distance;
+    float step = (exit - entry) / float(count);
+    float depth_per_alpha = step * ray_length * view.per_opacity_distance;
 
     vec4 rgba = vec4(0.0);
     float transmittance = 1.0;
     float mean_distance = 0.0;
     for (uint i = 0; i < count; i++) {
-        float s = s_entry * (1.0 - (float(i) + 0.5) / float(count));
-        vec4 texel = fetch(exit_texture + s * eye_from_exit_texture, exit_view.z * (1.0 - s));
+        float z = entry + (float(i) + 0.5) * step;
+        vec4 texel = fetch(texture_at_eye + z * texture_from_depth, z);
         float depth = optical_depth(texel.a) * depth_per_alpha;
         float alpha = opacity(depth);
         // Colour is premultiplied by the texture's alpha; what counts is this step's.
         vec3 colour = texel.a > 0.0 ? texel.rgb * (alpha / texel.a) : vec3(0.0);
         rgba += transmittance * vec4(colour, alpha);
 #ifdef DEPTH
-        mean_distance += transmittance * alpha * exit_distance * (1.0 - s);
+        mean_distance += transmittance * alpha * z * ray_length;
 #endif
         transmittance *= exp(-depth);
     }

@@ -392,6 +392,11 @@ impl Gpu {
         &self.info
     }
 
+    /// The rasteriser's subpixels a pixel: it snaps vertices to this grid.
+    pub fn subpixels(&self) -> u32 {
+        1 << self.limits.sub_pixel_precision_bits
+    }
+
     /// Whether images of `format` with optimal tiling can do all of `features`.
     pub(super) fn supports(&self, format: vk::Format, features: vk::FormatFeatureFlags) -> bool {
         // SAFETY: plain query.

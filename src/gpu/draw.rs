@@ -29,7 +29,8 @@ pub struct PipelineInfo<'a> {
 }
 
 /// A graphics pipeline without vertex input: triangles pulled from buffers, blended front to back,
-/// `destination += (1 - destination.alpha) * source`, both faces drawn, no depth test.
+/// `destination += (1 - destination.alpha) * source`, no depth test. Only triangles that run clockwise on the
+/// picture are drawn.
 #[derive(Debug)]
 pub struct Pipeline {
     raw: vk::Pipeline,
@@ -91,7 +92,8 @@ impl Pipeline {
         let viewports = vk::PipelineViewportStateCreateInfo::default().viewport_count(1).scissor_count(1);
         let raster = vk::PipelineRasterizationStateCreateInfo::default()
             .polygon_mode(vk::PolygonMode::FILL)
-            .cull_mode(vk::CullModeFlags::NONE)
+            .cull_mode(vk::CullModeFlags::BACK)
+            .front_face(vk::FrontFace::CLOCKWISE)
             .line_width(1.0);
         let samples = vk::PipelineMultisampleStateCreateInfo::default()
             .rasterization_samples(vk::SampleCountFlags::TYPE_1);

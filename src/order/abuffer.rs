@@ -14,7 +14,7 @@
 //!   in front of the eye are met (the near plane plays no part);
 //! - runs may overlap where the shell overlaps itself: a tetrahedron is related to every entry
 //!   until a run that began after it must have ended;
-//! - samples stand [`NUDGE`] off the pixel centres: a symmetric scene sends rays exactly through edges and
+//! - samples stand 1e-10 pixels off the pixel centres: a symmetric scene sends rays exactly through edges and
 //!   vertices, where rounding would decide on its own which faces are met, and in which order.
 //!
 //! Inverse depth is used for depth: it is linear in pixel coordinates over a plane.
@@ -82,11 +82,12 @@ impl Raster {
     }
 
     /// The indices, of `size` along one axis, whose samples lie in `low..=high`, with a margin.
-    fn indices(low: f64, high: f64, size: usize) -> Range<usize> {
+    fn indices(low: f64, high: f64, size: usize) -> Range<u32> {
         let first = 0.5 * size as f64 - 0.5;
-        let begin = (low + first - MARGIN).ceil().clamp(0.0, size as f64);
-        let end = ((high + first + MARGIN).floor() + 1.0).clamp(begin, size as f64);
-        begin as usize..end as usize
+        // Casts round towards zero, saturate, and are one instruction; floor and ceil are calls.
+        let begin = (low + first - MARGIN + 1.0).min(size as f64) as u32;
+        let end = (high + first + MARGIN + 1.0).min(size as f64) as u32;
+        begin..end
     }
 }
 
@@ -95,12 +96,13 @@ impl Raster {
 struct Footprint {
     /// Positive inside.
     edges: [Line; 3],
+    /// For each edge `-1 / x`: times the rest of the function it is the column where the edge is crossed.
+    edge_columns: [f64; 3],
     /// Inverse depth, in front of the eye inside.
     inverse_depth: Line,
-    columns: Range<usize>,
-    rows: Range<usize>,
-    cell: u32,
-    leaves: bool,
+    columns: Range<u32>,
+    rows: Range<u32>,
+    crossing: Crossing,
 }
 
 /// The range of `axis / z`, in pixels, over those points of a triangle that have positive z;
@@ -127,7 +129,7 @@ fn projected_range(corners: &[DVec3; 3], axis: usize, pixel: f64) -> (f64, f64) 
 }
 
 impl Footprint {
-    /// `None` where the face meets no pixel centre for sure.
+    /// `None` where the face surely meets no sample.
     /// `vertices` are relative to the eye: right, down, into the picture.
     fn new(face: &BoundaryFace, vertices: &[DVec3], raster: Raster) -> Option<Self> {
         let [p, q, r] = face.vertices.map(|v| vertices[v as usize]);
@@ -150,36 +152,60 @@ impl Footprint {
         // An edge function has the same bits, up to its sign, for every triangle on that edge.
         let edges = [q.cross(r), r.cross(p), p.cross(q)].map(|normal| Line::new(normal, pixel, eye_side));
         let inverse_depth = Line::new(normal, pixel, distance.recip());
-        Some(Self { edges, inverse_depth, columns, rows, cell: face.cell, leaves: face.leaves })
+        let edge_columns = edges.map(|edge| -edge.x.recip());
+        Some(Self { edges, edge_columns, inverse_depth, columns, rows, crossing: Crossing::new(face) })
     }
 
-    /// Calls `visit(x, inverse depth)` for the pixels of row `y` that are covered.
-    fn cover_row(&self, y: usize, raster: Raster, mut visit: impl FnMut(usize, f64)) {
+    /// The columns of row `y` that are covered.
+    fn covered(&self, y: usize, raster: Raster) -> Range<usize> {
         let row = raster.row(y);
-        let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);
         let at_row = self.edges.map(|edge| edge.y * row + edge.constant);
-        for (edge, at_row) in self.edges.iter().zip(at_row) {
-            let crossing = -at_row / edge.x;
-            if edge.x > 0.0 {
-                low = low.max(crossing);
-            } else if edge.x < 0.0 {
-                high = high.min(crossing);
-            }
+        let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);
+        for ((edge, at_row), per_value) in self.edges.iter().zip(at_row).zip(self.edge_columns) {
+            let crossing = at_row * per_value;
+            low = if edge.x > 0.0 { low.max(crossing) } else { low };
+            high = if edge.x < 0.0 { high.min(crossing) } else { high };
         }
         let span = Raster::indices(low, high, raster.width);
-        let columns = span.start.max(self.columns.start)..span.end.min(self.columns.end);
-        let depth_at_row = self.inverse_depth.y * row + self.inverse_depth.constant;
-        let owns_zero = self.edges.map(|edge| edge.owns_zero());
-        for x in columns {
+        let mut start = span.start.max(self.columns.start) as usize;
+        let mut end = (span.end.min(self.columns.end) as usize).max(start);
+        // The crossings are rounded; the edge functions decide. Each is monotonic in the column even as
+        // rounded, so what is covered is an interval, and only its ends need to be tried.
+        let covers = |x: usize| {
             let column = raster.column(x);
-            let covered = (0..3).all(|i| {
-                let value = self.edges[i].x * column + at_row[i];
-                value > 0.0 || (value == 0.0 && owns_zero[i])
-            });
-            if covered {
-                visit(x, self.inverse_depth.x * column + depth_at_row);
-            }
+            self.edges.iter().zip(at_row).all(|(edge, at_row)| {
+                let value = edge.x * column + at_row;
+                value > 0.0 || (value == 0.0 && edge.owns_zero())
+            })
+        };
+        while start < end && !covers(start) {
+            start += 1;
         }
+        while start < end && !covers(end - 1) {
+            end -= 1;
+        }
+        start..end
+    }
+}
+
+/// What a boundary face does to a ray: it leaves a tetrahedron, or enters it. Ordered: leaves first.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct Crossing(u32);
+
+impl Crossing {
+    const ENTERS: u32 = 1 << 31;
+
+    fn new(face: &BoundaryFace) -> Self {
+        debug_assert!(face.cell < Self::ENTERS);
+        Self(if face.leaves { face.cell } else { face.cell | Self::ENTERS })
+    }
+
+    fn cell(self) -> u32 {
+        self.0 & !Self::ENTERS
+    }
+
+    fn leaves(self) -> bool {
+        self.0 & Self::ENTERS == 0
     }
 }
 
@@ -187,7 +213,7 @@ impl Footprint {
 #[derive(Debug, Clone, Copy)]
 struct Fragment {
     inverse_depth: f64,
-    footprint: u32,
+    crossing: Crossing,
     /// The next fragment of the pixel, or [`NONE`].
     next: u32,
 }
@@ -245,7 +271,7 @@ pub fn relate(
         .enumerate()
         .map_init(scratch, |scratch, (band, members)| {
             scratch.collect_fragments(band, members, &footprints, raster);
-            scratch.relate_pixels(&footprints)
+            scratch.relate_pixels()
         })
         .collect()
 }
@@ -254,7 +280,8 @@ pub fn relate(
 fn footprints_of_bands(footprints: &[Footprint], raster: Raster) -> Vec<Vec<u32>> {
     let mut bands = vec![Vec::new(); raster.height.div_ceil(BAND)];
     for (id, footprint) in (0u32..).zip(footprints) {
-        for band in &mut bands[footprint.rows.start / BAND..=(footprint.rows.end - 1) / BAND] {
+        let Range { start, end } = footprint.rows;
+        for band in &mut bands[start as usize / BAND..(end as usize).div_ceil(BAND)] {
             band.push(id);
         }
     }
@@ -269,18 +296,23 @@ impl Scratch {
         let first_row = band * BAND;
         for &id in members {
             let footprint = &footprints[id as usize];
-            for y in footprint.rows.start.max(first_row)..footprint.rows.end.min(first_row + BAND) {
+            let rows = footprint.rows.start as usize..footprint.rows.end as usize;
+            for y in rows.start.max(first_row)..rows.end.min(first_row + BAND) {
                 let heads = &mut self.heads[(y - first_row) * raster.width..][..raster.width];
-                footprint.cover_row(y, raster, |x, inverse_depth| {
-                    let next = std::mem::replace(&mut heads[x], self.fragments.len() as u32);
-                    self.fragments.push(Fragment { inverse_depth, footprint: id, next });
-                });
+                let columns = footprint.covered(y, raster);
+                let Line { x: slope, y: row_slope, constant } = footprint.inverse_depth;
+                let at_row = row_slope * raster.row(y) + constant;
+                for (x, head) in columns.clone().zip(&mut heads[columns]) {
+                    let inverse_depth = slope * raster.column(x) + at_row;
+                    let next = std::mem::replace(head, self.fragments.len() as u32);
+                    self.fragments.push(Fragment { inverse_depth, crossing: footprint.crossing, next });
+                }
             }
         }
     }
 
     /// Sorts the lists and follows each ray.
-    fn relate_pixels(&mut self, footprints: &[Footprint]) -> Vec<[u32; 2]> {
+    fn relate_pixels(&mut self) -> Vec<[u32; 2]> {
         let mut pairs = Vec::new();
         for pixel in 0..self.heads.len() {
             self.list.clear();
@@ -293,22 +325,21 @@ impl Scratch {
             if self.list.len() < 2 {
                 continue;
             }
-            sort_front_to_back(&mut self.list, footprints);
-            self.follow_ray(footprints, &mut pairs);
+            sort_front_to_back(&mut self.list);
+            self.follow_ray(&mut pairs);
         }
         pairs
     }
 
     /// Relates what one ray leaves to what it enters next; `self.list` is sorted.
-    fn follow_ray(&mut self, footprints: &[Footprint], pairs: &mut Vec<[u32; 2]>) {
-        let face = |fragment: &Fragment| &footprints[fragment.footprint as usize];
-        let leaves = self.list.iter().filter(|fragment| face(fragment).leaves).count();
+    fn follow_ray(&mut self, pairs: &mut Vec<[u32; 2]>) {
+        let leaves = self.list.iter().filter(|fragment| fragment.crossing.leaves()).count();
         // Every run ends in front of the eye; those that do not begin there hold the eye.
         let mut open_runs = (2 * leaves).saturating_sub(self.list.len());
         self.left.clear();
         for fragment in &self.list {
-            let Footprint { cell, leaves, .. } = *face(fragment);
-            if leaves {
+            let cell = fragment.crossing.cell();
+            if fragment.crossing.leaves() {
                 open_runs = open_runs.saturating_sub(1);
                 self.left.retain_mut(|(_, leaves_to_go)| {
                     *leaves_to_go -= 1;
@@ -332,10 +363,76 @@ impl Scratch {
 
 /// Sorts the fragments of a pixel by depth; faces in the same place (equal to the last bit, since the
 /// order of a face's vertices is canonical) by leaves before entries, then by id.
-fn sort_front_to_back(list: &mut [Fragment], footprints: &[Footprint]) {
+fn sort_front_to_back(list: &mut [Fragment]) {
     list.sort_unstable_by(|a, b| {
-        let leaves = |fragment: &Fragment| footprints[fragment.footprint as usize].leaves;
-        let nearer = b.inverse_depth.total_cmp(&a.inverse_depth);
-        nearer.then_with(|| leaves(b).cmp(&leaves(a))).then(a.footprint.cmp(&b.footprint))
+        b.inverse_depth.total_cmp(&a.inverse_depth).then(a.crossing.cmp(&b.crossing))
     });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::Camera;
+
+    /// The pairs of a stack of faces on the axis, each given as `(depth, tetrahedron, leaves)`.
+    fn pairs_of(stack: &[(f64, u32, bool)]) -> Vec<[u32; 2]> {
+        let mut list: Vec<Fragment> = stack
+            .iter()
+            .map(|&(depth, cell, leaves)| {
+                let face = BoundaryFace { vertices: [0; 3], cell, leaves, eye_side: 1 };
+                Fragment { inverse_depth: depth.recip(), crossing: Crossing::new(&face), next: NONE }
+            })
+            .collect();
+        sort_front_to_back(&mut list);
+        let last_front = vec![NONE; stack.len()];
+        let mut scratch = Scratch { heads: vec![], fragments: vec![], list, left: vec![], last_front };
+        let mut pairs = vec![];
+        scratch.follow_ray(&mut pairs);
+        pairs
+    }
+
+    #[test]
+    fn what_a_ray_leaves_is_in_front_of_what_it_enters_next() {
+        let outside = [(1.0, 0, false), (2.0, 1, true), (3.0, 2, false), (4.0, 3, true), (5.0, 4, false)];
+        assert_eq!(pairs_of(&outside), [[1, 2], [3, 4]]);
+        let inside = [(1.0, 0, true), (2.0, 1, false), (3.0, 2, true)];
+        assert_eq!(pairs_of(&inside), [[0, 1]]);
+        let in_one_place = [(2.0, 1, false), (2.0, 0, true), (1.0, 2, false), (3.0, 3, true)];
+        assert_eq!(pairs_of(&in_one_place), [[0, 1]]);
+    }
+
+    #[test]
+    fn runs_that_overlap_follow_all_that_ended_before_them() {
+        // A run ends with 0; then the runs 1..3 and 2..4 overlap, and run 5 follows both.
+        let stack = [
+            (0.5, 6, false),
+            (1.0, 0, true),
+            (2.0, 1, false),
+            (3.0, 2, false),
+            (4.0, 3, true),
+            (5.0, 4, true),
+            (6.0, 5, false),
+            (7.0, 5, true),
+        ];
+        assert_eq!(pairs_of(&stack), [[0, 1], [0, 2], [3, 5], [4, 5]]);
+    }
+
+    #[test]
+    fn faces_that_reach_behind_the_eye_cover_what_their_part_in_front_projects_to() {
+        let camera = Camera { eye: DVec3::ZERO, target: -DVec3::Z, up: DVec3::Y, fov_y: 1.2, near: 0.1 };
+        let view = View { camera, width: 40, height: 30, depth: false };
+        let raster = Raster { width: 40, height: 30, pixel: view.pixel_at_unit_depth() };
+        // A floor below the eye, from far in front to far behind: it covers just the lower half.
+        let corners = [DVec3::new(0.0, 1.0, 1e6), DVec3::new(1e7, 1.0, -1e6), DVec3::new(-1e7, 1.0, -1e6)];
+        let orientation = corners[0].dot(corners[1].cross(corners[2]));
+        let eye_side = if orientation > 0.0 { 1 } else { -1 };
+        let face = BoundaryFace { vertices: [0, 1, 2], cell: 0, leaves: false, eye_side };
+        let footprint = Footprint::new(&face, &corners, raster).unwrap();
+        for y in 0..30 {
+            let covered = footprint.covered(y, raster);
+            assert_eq!(covered.len(), if y < 15 { 0 } else { 40 }, "row {y}");
+        }
+        let behind = corners.map(|corner| corner * DVec3::new(1.0, 1.0, 0.0) - DVec3::Z);
+        assert!(Footprint::new(&face, &behind, raster).is_none());
+    }
 }

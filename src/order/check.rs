@@ -1,7 +1,7 @@
 //! Is an order right? The order of the tetrahedra along rays, found independently of how the order was made.
 //!
-//! Each ray is cut with the four planes of each tetrahedron that it may meet, in f64 with a running error
-//! bound, and ranks must increase along it. Nothing is shared with the sort but the vertices.
+//! Each ray is cut with the four planes of each tetrahedron that it may meet, in f64 with a bound on the
+//! error of each cut, and ranks must increase along it. Nothing is shared with the sort but the vertices.
 
 use bvh::aabb::{Aabb, Bounded};
 use bvh::bounding_hierarchy::BHShape;
@@ -70,11 +70,18 @@ impl Check {
     }
 }
 
-/// A number known up to an absolute error.
+/// A computed number with a bound on its absolute error.
 #[derive(Debug, Clone, Copy)]
 struct Approximate {
     value: f64,
     error: f64,
+}
+
+/// Between which numbers the true one lies for sure.
+#[derive(Debug, Clone, Copy)]
+struct Bounds {
+    low: f64,
+    high: f64,
 }
 
 /// The inside of a face's plane along a ray from the eye: `distance + t * slope >= 0`.
@@ -104,8 +111,8 @@ struct Interval {
     id: u32,
     rank: u32,
     cycle: u32,
-    entry: Approximate,
-    exit: Approximate,
+    entry: Bounds,
+    exit: Bounds,
 }
 
 /// No cycle.
@@ -144,39 +151,37 @@ impl Solid {
 
     /// `Err` where the ray passes too near to the boundary to tell whether it passes through.
     fn interval(&self, ray: DVec3) -> Result<Option<Interval>, ()> {
-        let mut entry = Approximate { value: 0.0, error: 0.0 };
-        let mut exit = Approximate { value: f64::INFINITY, error: 0.0 };
+        let mut entry = Bounds { low: 0.0, high: 0.0 };
+        let mut exit = Bounds { low: f64::INFINITY, high: f64::INFINITY };
         let length = ray.length();
-        let mut grazing = false;
-        for face in &self.faces {
-            let slope = Approximate { value: face.normal.dot(ray), error: face.slope_error * length };
+        for &HalfSpace { normal, distance, slope_error } in &self.faces {
+            let slope = Approximate { value: normal.dot(ray), error: slope_error * length };
             if slope.value.abs() <= slope.error {
-                // Parallel as far as can be told: on the inside all along, outside, or in the plane.
-                if face.distance.value < -face.distance.error {
-                    return Ok(None);
+                // Parallel to the plane as far as can be told: it is crossed no nearer than here.
+                let nearest = (distance.value.abs() - distance.error) / (slope.value.abs() + slope.error);
+                if distance.value > distance.error {
+                    exit.low = exit.low.min(nearest);
+                } else {
+                    entry.low = entry.low.max(nearest);
+                    entry.high = f64::INFINITY;
                 }
-                grazing |= face.distance.value <= face.distance.error;
                 continue;
             }
-            let t = -face.distance.value / slope.value;
-            let error = (face.distance.error + t.abs() * slope.error) / (slope.value.abs() - slope.error)
+            let t = -distance.value / slope.value;
+            let error = (distance.error + t.abs() * slope.error) / (slope.value.abs() - slope.error)
                 + f64::EPSILON * t.abs();
-            let crossing = Approximate { value: t, error };
             if slope.value > 0.0 {
-                if t > entry.value {
-                    entry = crossing;
-                }
-            } else if t < exit.value {
-                exit = crossing;
+                entry = Bounds { low: entry.low.max(t - error), high: entry.high.max(t + error) };
+            } else {
+                exit = Bounds { low: exit.low.min(t - error), high: exit.high.min(t + error) };
             }
         }
-        let rounding = entry.error + exit.error;
-        if exit.value - entry.value < -rounding {
+        if exit.high < entry.low {
             Ok(None)
-        } else if exit.value - entry.value <= rounding || grazing {
-            Err(())
-        } else {
+        } else if exit.low > entry.high {
             Ok(Some(Interval { id: self.id, rank: self.rank, cycle: self.cycle, entry, exit }))
+        } else {
+            Err(())
         }
     }
 }
@@ -199,13 +204,14 @@ impl BHShape<f64, 3> for Solid {
 
 /// Checks `order` along rays from `eye`; both it and the ray directions (of any length) are in world space.
 pub fn check(shell: &Shell, order: &Order, eye: DVec3, rays: &[DVec3]) -> Check {
-    let solids = solids(shell, order, eye);
-    let Solids { solids, tree } = &solids;
+    let mut solids = solids(shell, order, eye);
+    let tree = Bvh::build(&mut solids);
     rays.par_chunks(256)
         .map(|rays| {
             let mut intervals = Vec::new();
-            rays.iter()
-                .fold(Check::default(), |found, &ray| found.and(check_ray(solids, tree, ray, &mut intervals)))
+            rays.iter().fold(Check::default(), |found, &ray| {
+                found.and(check_ray(&solids, &tree, ray, &mut intervals))
+            })
         })
         .collect::<Vec<_>>()
         .into_iter()
@@ -221,26 +227,19 @@ pub fn check_pixels(shell: &Shell, order: &Order, view: &View) -> Check {
     check(shell, order, view.camera.eye, &rays)
 }
 
-/// Tetrahedra with a tree to find them by.
-struct Solids {
-    solids: Vec<Solid>,
-    tree: Bvh<f64, 3>,
-}
-
-fn solids(shell: &Shell, order: &Order, eye: DVec3) -> Solids {
+/// The tetrahedra that have volume.
+fn solids(shell: &Shell, order: &Order, eye: DVec3) -> Vec<Solid> {
     let mut cycle_at = vec![ACYCLIC; order.sequence.len()];
     for (number, cycle) in (0u32..).zip(&order.cycles) {
         cycle_at[cycle.clone()].fill(number);
     }
-    let mut solids: Vec<Solid> = (0u32..)
+    (0u32..)
         .zip(&order.sequence)
         .filter_map(|(rank, &id)| {
             let corners = shell.topology.tetrahedra[id as usize].map(|v| shell.vertices[v as usize]);
             Solid::new(corners, eye, id, rank, cycle_at[rank as usize])
         })
-        .collect();
-    let tree = Bvh::build(&mut solids);
-    Solids { solids, tree }
+        .collect()
 }
 
 fn check_ray(solids: &[Solid], tree: &Bvh<f64, 3>, ray: DVec3, intervals: &mut Vec<Interval>) -> Check {
@@ -255,7 +254,7 @@ fn check_ray(solids: &[Solid], tree: &Bvh<f64, 3>, ray: DVec3, intervals: &mut V
             Err(()) => found.touched += 1,
         }
     }
-    intervals.sort_unstable_by(|a, b| a.entry.value.total_cmp(&b.entry.value).then(a.id.cmp(&b.id)));
+    intervals.sort_unstable_by(|a, b| a.entry.low.total_cmp(&b.entry.low).then(a.id.cmp(&b.id)));
     for (i, front) in intervals.iter().enumerate() {
         for back in &intervals[i + 1..] {
             found.pairs += 1;
@@ -263,8 +262,7 @@ fn check_ray(solids: &[Solid], tree: &Bvh<f64, 3>, ray: DVec3, intervals: &mut V
                 found.cyclic += 1;
                 continue;
             }
-            let may_precede =
-                |a: &Interval, b: &Interval| a.exit.value - b.entry.value <= a.exit.error + b.entry.error;
+            let may_precede = |a: &Interval, b: &Interval| a.exit.low <= b.entry.high;
             match (may_precede(front, back), may_precede(back, front)) {
                 (true, true) => found.undecided += 1,
                 (false, false) => found.overlapping += 1,
@@ -282,4 +280,43 @@ fn check_ray(solids: &[Solid], tree: &Bvh<f64, 3>, ray: DVec3, intervals: &mut V
     }
     found.wrong_rays = u64::from(found.violations > 0);
     found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const EYE: DVec3 = DVec3::new(0.1, 0.2, 5.0);
+
+    fn solid(corners: [DVec3; 4]) -> Option<Solid> {
+        Solid::new(corners, EYE, 0, 0, ACYCLIC)
+    }
+
+    /// A corner of the unit cube.
+    fn corner() -> Solid {
+        solid([DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z]).unwrap()
+    }
+
+    #[test]
+    fn intervals_bound_the_true_entry_and_exit() {
+        // The ray (0.1, 0.2, 5 - t) enters at x + y + z = 1 and leaves at z = 0, within a few units of rounding.
+        let Interval { entry, exit, .. } = corner().interval(-DVec3::Z).unwrap().unwrap();
+        assert!(entry.low <= 4.3 && 4.3 <= entry.high && entry.high - entry.low < 1e-13);
+        assert!(exit.low <= 5.0 && 5.0 <= exit.high && exit.high - exit.low < 1e-13);
+    }
+
+    #[test]
+    fn rays_that_miss_pass_behind_or_touch_are_no_intervals() {
+        assert!(corner().interval(DVec3::Z).unwrap().is_none());
+        assert!(corner().interval(DVec3::new(1.0, 0.0, -1.0)).unwrap().is_none());
+        assert!(corner().interval(DVec3::Z - EYE).is_err(), "through a vertex");
+        assert!(corner().interval(DVec3::new(0.0, 0.2, 0.8) - EYE).is_err(), "along the outline");
+        assert!(solid([DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::X + DVec3::Y]).is_none(), "no volume");
+    }
+
+    #[test]
+    fn a_ray_in_a_faces_plane_only_touches() {
+        let side = solid([DVec3::ZERO, DVec3::X, EYE - DVec3::Z, EYE - 2.0 * DVec3::Z]).unwrap();
+        assert!(side.interval(-DVec3::Z).is_err());
+    }
 }

@@ -11,7 +11,7 @@
 //!
 //! The order is right for every pixel's ray as long as tetrahedra do not intersect and their order has no
 //! cycle. Cycles are found exactly and reported; intersections (a shell that overlaps itself) have no right
-//! order where they are, and [`check`] counts them apart.
+//! order where they are, and [`check()`] counts them apart.
 
 pub mod abuffer;
 pub mod check;

@@ -93,8 +93,7 @@ impl FaceTable {
         for (cell, (&tetrahedron, neighbours)) in
             (0u32..).zip(topology.tetrahedra.iter().zip(&topology.neighbours))
         {
-            for k in 0..4 {
-                let other = neighbours[k];
+            for (k, &other) in neighbours.iter().enumerate() {
                 if other < cell {
                     continue; // listed from the other side
                 }
@@ -162,5 +161,69 @@ impl FaceTable {
             }
         }
         Relations { pairs, exit_faces, boundary }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two tetrahedra on the face (0, 1, 2), with their fourth vertices 3 and 4 at heights `z`.
+    fn two_on_a_face(z: [f64; 2]) -> (Topology, Vec<DVec3>) {
+        let topology = Topology {
+            tetrahedra: vec![[0, 1, 2, 3], [4, 1, 0, 2]],
+            neighbours: vec![[EXTERIOR, EXTERIOR, EXTERIOR, 1], [0, EXTERIOR, EXTERIOR, EXTERIOR]],
+            ..Topology::default()
+        };
+        let corner = DVec3::new(0.2, 0.2, 0.0);
+        let fourth = z.map(|z| corner + z * DVec3::Z);
+        (topology, vec![DVec3::ZERO, DVec3::X, DVec3::Y, fourth[0], fourth[1]])
+    }
+
+    fn seen_from(z: f64, heights: [f64; 2]) -> Relations {
+        let (topology, vertices) = two_on_a_face(heights);
+        FaceTable::new(&topology).relate(&topology, &vertices, DVec3::new(0.3, 0.1, z))
+    }
+
+    /// Tetrahedra with the shared face in the A-buffer.
+    fn shared_in_boundary(relations: &Relations) -> Vec<(u32, bool)> {
+        let shared = relations.boundary.iter().filter(|face| face.vertices == [0, 1, 2]);
+        shared.map(|face| (face.cell, face.leaves)).collect()
+    }
+
+    #[test]
+    fn the_eyes_side_is_in_front_inverted_or_not() {
+        for (eye, heights, pair) in [
+            (5.0, [1.0, -1.0], [0, 1]),
+            (-5.0, [1.0, -1.0], [1, 0]),
+            (5.0, [-1.0, 1.0], [1, 0]),
+            (1e-300, [1.0, -1.0], [0, 1]),
+        ] {
+            let relations = seen_from(eye, heights);
+            assert_eq!(relations.pairs, [pair]);
+            assert!(shared_in_boundary(&relations).is_empty());
+            assert_eq!(relations.exit_faces[0] >> 3 & 1, u8::from(pair[0] == 0));
+            assert_eq!(relations.exit_faces[1] & 1, u8::from(pair[0] == 1));
+        }
+        assert!(seen_from(0.0, [1.0, -1.0]).pairs.is_empty());
+    }
+
+    #[test]
+    fn a_fold_makes_no_relation_but_two_boundary_faces() {
+        let relations = seen_from(5.0, [1.0, 2.0]);
+        assert!(relations.pairs.is_empty());
+        assert_eq!(shared_in_boundary(&relations), [(0, true), (1, true)]);
+    }
+
+    #[test]
+    fn a_tetrahedron_without_volume_is_placed_by_its_neighbour() {
+        for (eye, pair) in [(5.0, [0, 1]), (-5.0, [1, 0])] {
+            let relations = seen_from(eye, [1.0, 0.0]);
+            assert_eq!(relations.pairs, [pair]);
+            assert_eq!(shared_in_boundary(&relations), [(0, eye > 0.0)]);
+            assert_eq!(relations.exit_faces[1], 0);
+        }
+        let relations = seen_from(5.0, [0.0, 0.0]);
+        assert!(relations.pairs.is_empty() && relations.boundary.is_empty());
     }
 }

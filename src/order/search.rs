@@ -123,3 +123,38 @@ impl InFront {
         (sequence, cycles)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rows_hold_each_relation_once_in_ascending_order() {
+        let graph = InFront::new(3, &[&[[2, 0], [1, 0]], &[[1, 0], [2, 1]]]);
+        assert_eq!(graph, InFront { start: vec![0, 2, 3, 3], front: vec![1, 2, 2] });
+        assert_eq!(graph.relations(), 3);
+        assert_eq!(graph.components(), (vec![2, 1, 0], vec![]));
+        assert_eq!(InFront::new(0, &[]).components(), (vec![], vec![]));
+    }
+
+    #[test]
+    fn a_chain_of_a_million_needs_no_deep_stack() {
+        let count = 1_000_000;
+        let chain: Vec<[u32; 2]> = (1..count).map(|id| [id, id - 1]).collect();
+        let (sequence, cycles) = InFront::new(count as usize, &[&chain]).components();
+        assert!(sequence.into_iter().eq((0..count).rev()));
+        assert!(cycles.is_empty());
+    }
+
+    #[test]
+    fn cycles_are_exactly_the_components_of_more_than_one() {
+        // 0 is in front of the cycle 1 2 3, which is in front of 4; 5 and 6 are a cycle apart.
+        let pairs = [[0, 1], [1, 2], [2, 3], [3, 1], [3, 4], [5, 6], [6, 5]];
+        let (sequence, cycles) = InFront::new(7, &[&pairs]).components();
+        assert_eq!(cycles, [1..4, 5..7]);
+        assert_eq!((sequence[0], sequence[4]), (0, 4));
+        let mut members = sequence[1..4].to_vec();
+        members.sort_unstable();
+        assert_eq!(members, [1, 2, 3]);
+    }
+}

@@ -58,7 +58,8 @@ fn halved(finer: &Volume, thickness: f64) -> Volume {
                 }
             }
             let area = texels_per_coarse(finer.size[0]) * texels_per_coarse(finer.size[1]);
-            *texel = sum.map(|value| (value / area) as f32);
+            // Only a glow near the end of f32, gathered from several layers, would overflow.
+            *texel = sum.map(|value| (value / area).min(f64::from(f32::MAX)) as f32);
         }
     });
     Volume { size, texels }
@@ -226,6 +227,17 @@ mod tests {
         let expected = [colour[0] * scale, colour[1] * scale, colour[2] * scale, alpha];
         // The expectation itself takes two roundings a layer.
         assert_near(top(&Pyramid::build(volume)), expected, 4.0 * ROUNDING);
+    }
+
+    #[test]
+    fn a_glow_without_opacity_is_gathered_and_stays_finite() {
+        let glow = [1.5, 0.0, 3.0, 0.0];
+        assert_eq!(top(&Pyramid::build(column(&[glow; 4]))), glow);
+        assert_eq!(top(&Pyramid::build(column(&[[0.0, 0.0, 0.0, 1.0], glow]))), [1.5, 0.0, 3.0, 1.0]);
+        assert_eq!(
+            top(&Pyramid::build(column(&[[f32::MAX, 0.0, 0.0, 1.0], [f32::MAX, 0.0, 0.0, 0.0]])))[0],
+            f32::MAX
+        );
     }
 
     #[test]

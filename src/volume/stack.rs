@@ -9,7 +9,7 @@ use std::fs::File;
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
-use image::{ColorType, DynamicImage, ImageDecoder as _, ImageFormat, ImageReader};
+use image::{ColorType, DynamicImage, ImageDecoder, ImageFormat, ImageReader};
 
 use super::raw::{check_fits_memory, claimed_size, unreadable};
 use super::sample::linear_from_srgb;
@@ -34,28 +34,34 @@ pub(super) fn read(path: &Path) -> Result<RawVolume> {
     };
 
     let mut values = Vec::new();
-    let mut first = None;
+    let shape = shape(&decoder(&images[0])?);
+    let ((width, height), colour) = shape;
+    let channels = u32::from(colour.channel_count());
+    let size = [u64::from(width), u64::from(height), images.len() as u64];
+    let (size, _) = claimed_size(path, size, channels)?;
+    check_fits_memory(path, size)?;
     for image in &images {
         let decoder = decoder(image)?;
-        let shape = (decoder.dimensions(), decoder.color_type());
-        let (expected, channels) = *first.get_or_insert((shape, shape.1.channel_count()));
-        if shape != expected {
-            let describe = |((width, height), colour)| format!("{width} x {height} {colour:?}");
+        let found = self::shape(&decoder);
+        if found != shape {
+            let describe = |((width, height), colour): Shape| format!("{width} x {height} {colour:?}");
             let message =
-                format!("is {}, but {} is {}", describe(shape), images[0].display(), describe(expected));
+                format!("is {}, but {} is {}", describe(found), images[0].display(), describe(shape));
             return Err(Error::input(image, message).with_help("all images of a stack must be alike"));
         }
-        let size = [u64::from(shape.0.0), u64::from(shape.0.1), images.len() as u64];
-        check_fits_memory(path, claimed_size(path, size, u32::from(channels))?.0)?;
-        let image = DynamicImage::from_decoder(decoder).map_err(|error| undecodable(image, &error))?;
-        append(&mut values, image, channels);
+        let decoded = DynamicImage::from_decoder(decoder).map_err(|error| undecodable(image, &error))?;
+        append(&mut values, &decoded, channels);
     }
-    let ((dimensions, colour), channels) = first.expect("a stack has an image");
-    let size = [dimensions.0, dimensions.1, images.len() as u32];
     let format = format!("PNG {colour:?}");
-    let channels = u32::from(channels);
     let alpha_mode = AlphaMode::Straight;
     RawVolume { path: path.into(), format, size, channels, values, full_scale: 1.0, alpha_mode }.validated()
+}
+
+/// The width and height of an image, and what its pixels are.
+type Shape = ((u32, u32), ColorType);
+
+fn shape(decoder: &impl ImageDecoder) -> Shape {
+    (decoder.dimensions(), decoder.color_type())
 }
 
 fn undecodable(path: &Path, error: &image::ImageError) -> Error {
@@ -63,7 +69,7 @@ fn undecodable(path: &Path, error: &image::ImageError) -> Error {
 }
 
 /// A decoder that has read the header of the PNG at `path` and found its size plausible.
-fn decoder(path: &Path) -> Result<impl image::ImageDecoder> {
+fn decoder(path: &Path) -> Result<impl ImageDecoder> {
     let file = File::open(path).map_err(|error| unreadable(path, &error))?;
     let length = file.metadata().map_err(|error| unreadable(path, &error))?.len();
     let decoder = ImageReader::with_format(BufReader::new(file), ImageFormat::Png)
@@ -79,7 +85,7 @@ fn decoder(path: &Path) -> Result<impl image::ImageDecoder> {
 }
 
 /// Appends an image's values: PNG decodes to 8 or 16 bits a channel, of 1 to 4 channels.
-fn append(values: &mut Vec<f32>, image: DynamicImage, channels: u8) {
+fn append(values: &mut Vec<f32>, image: &DynamicImage, channels: u32) {
     let start = values.len();
     match image.color() {
         ColorType::L8 | ColorType::La8 | ColorType::Rgb8 | ColorType::Rgba8 => {
@@ -95,7 +101,7 @@ fn append(values: &mut Vec<f32>, image: DynamicImage, channels: u8) {
         2 => 1,
         _ => 3,
     };
-    for texel in values[start..].chunks_exact_mut(channels.into()) {
+    for texel in values[start..].chunks_exact_mut(channels as usize) {
         for value in &mut texel[..colours] {
             *value = linear_from_srgb(*value);
         }

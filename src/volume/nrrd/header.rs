@@ -17,8 +17,8 @@ pub(super) struct Header {
     pub(super) data_file: Option<String>,
     /// Lines before the data, as stored.
     pub(super) line_skip: usize,
-    /// Then bytes, once decompressed; at least -1, which stands for all before the last that are needed.
-    pub(super) byte_skip: i64,
+    /// Then bytes, once decompressed; without it, which only raw data has, all before the last that are needed.
+    pub(super) byte_skip: Option<u64>,
 }
 
 #[derive(Clone, Copy)]
@@ -85,11 +85,15 @@ impl Header {
             None => 0,
         };
         let byte_skip = match fields.get("byte skip") {
+            Some((_, text)) if text == "-1" && matches!(encoding, Encoding::Raw) => None,
             Some((line, text)) => {
-                let skip = text.parse().ok().filter(|&skip: &i64| skip >= -1);
-                skip.ok_or_else(|| at(*line, format!("`{text}` is not a number of bytes")))?
+                let skip = text.parse().map_err(|_| {
+                    let error = at(*line, format!("`{text}` is not a number of bytes to skip"));
+                    error.with_help("-1, for all before the data, is possible only with the encoding raw")
+                })?;
+                Some(skip)
             }
-            None => 0,
+            None => Some(0),
         };
         let data_file = match fields.get("data file") {
             Some((line, name)) if name.starts_with("LIST") || name.contains('%') => {

@@ -62,8 +62,8 @@ pub(super) fn read(path: &Path) -> Result<RawVolume> {
             header.number.decode(&data, header.little_endian)
         }
         Encoding::Text => {
-            let skip = usize::try_from(header.byte_skip).ok().and_then(|skip| data.get(skip..));
-            let values = text_values(data_path, skip.unwrap_or_default(), count)?;
+            let start = bytes_to_skip(&header).unwrap_or_default();
+            let values = text_values(data_path, data.get(start..).unwrap_or_default(), count)?;
             check_fits_memory(path, size)?;
             values
         }
@@ -100,13 +100,15 @@ fn wrong_length(path: &Path, number: &Number, count: usize, comparison: &str) ->
     Error::input(path, message)
 }
 
-/// Exactly `count` values after the byte skip; a skip of -1 counts from the end.
+/// The byte skip where there is one; more than any file has if it is more than memory could have.
+fn bytes_to_skip(header: &Header) -> Option<usize> {
+    header.byte_skip.map(|skip| usize::try_from(skip).unwrap_or(usize::MAX))
+}
+
+/// Exactly `count` values after the byte skip, or else at the end.
 fn raw_data<'a>(path: &Path, data: &'a [u8], header: &Header, count: usize) -> Result<&'a [u8]> {
     let length = count * header.number.bytes();
-    let start = match header.byte_skip {
-        -1 => data.len().saturating_sub(length),
-        skip => usize::try_from(skip).unwrap_or(usize::MAX),
-    };
+    let start = bytes_to_skip(header).unwrap_or(data.len().saturating_sub(length));
     match data.get(start..) {
         Some(data) if data.len() == length => Ok(data),
         Some(data) if data.len() > length => Err(wrong_length(path, &header.number, count, "more")),
@@ -118,9 +120,8 @@ fn raw_data<'a>(path: &Path, data: &'a [u8], header: &Header, count: usize) -> R
 fn inflated(path: &Path, data: &[u8], header: &Header, count: usize) -> Result<Vec<u8>> {
     let damaged = |error| Error::input(path, format!("its gzip data is damaged: {error}"));
     let mut stream = MultiGzDecoder::new(data);
-    let skip = u64::try_from(header.byte_skip)
-        .map_err(|_| Error::input(path, "a byte skip of -1 is possible only with the encoding raw"))?;
-    std::io::copy(&mut stream.by_ref().take(skip), &mut std::io::sink()).map_err(damaged)?;
+    std::io::copy(&mut stream.by_ref().take(header.byte_skip.unwrap_or(0)), &mut std::io::sink())
+        .map_err(damaged)?;
     let length = count * header.number.bytes();
     let mut inflated = Vec::new();
     stream.take(length as u64 + 1).read_to_end(&mut inflated).map_err(damaged)?;
@@ -259,7 +260,8 @@ mod tests {
             (fields("gzip", ""), gzip(&raw[..4]), "fewer"),
             (fields("gzip", ""), gzip(&vec![0; 1 << 24]), "more"),
             (fields("gzip", ""), gzip(&raw)[..20].to_vec(), "damaged"),
-            (fields("gzip", "\nbyte skip: -1"), gzip(&raw), "byte skip"),
+            (fields("gzip", "\nbyte skip: -1"), gzip(&raw), "`-1` is not"),
+            (fields("ascii", "\nbyte skip: -1"), b"1 2 3".to_vec(), "`-1` is not"),
             (fields("ascii", ""), b"1 2".to_vec(), "only 2 of 3"),
             (fields("ascii", ""), b"1 2 3 4".to_vec(), "more than 3"),
             (fields("ascii", ""), b"1 2 x".to_vec(), "`x` is not a number"),

@@ -59,14 +59,13 @@ impl Clouds {
     fn vapour(&self, grid: &Grid, position: Vec3, seed: u32) -> Vapour {
         // Nothing reaches the outer surface, and clouds are widest low down.
         let level = (position.z / grid.height - self.bottom) / (0.95 - self.bottom);
-        let profile = smoothstep(0., 0.2, level) * (1. - level.clamp(0., 1.).powi(2));
-        if profile <= 0. || self.coverage <= 0. {
+        if !(0. ..1.).contains(&level) || self.coverage <= 0. {
             return Vapour::NONE;
         }
+        let narrowing = 0.6 * smoothstep(0.2, 0., level) + 1.1 * level * level;
         let finest = grid.finest_noise();
         let shape = Octaves { cells: self.scale, count: self.octaves, gain: 0.45, finest };
-        let body = 1.6 * shape.gradient(position, seed) + self.coverage - 0.5;
-        let body = body - 0.7 * (1. - profile) - smoothstep(0.6, 1., level);
+        let body = 1.6 * shape.gradient(position, seed) + self.coverage - 0.5 - narrowing;
         // The billows add and take at most this much.
         let billowing = 0.9 * self.billowing;
         if body + 0.5 * billowing <= 0. {

@@ -24,7 +24,7 @@ keys! {
         /// Height of the longest strands as a share of the shell's thickness.
         length: f32 = 0.95, 0.05..=1.0;
         /// How much shorter the shortest strands are, as a share of `length`.
-        length_variation: f32 = 0.6, 0.0..=1.0;
+        length_variation: f32 = 0.5, 0.0..=1.0;
         /// Radius of a strand at its root, in tile widths.
         thickness: f32 = 0.005, 0.0005..=0.05;
         /// How much thinner the tip is than the root: 1 is a point.
@@ -99,7 +99,7 @@ impl Fur {
         let clump_height = random(clump.id, seed);
         let clump_turn = random(clump.id, seed ^ 0x7a) * 2. - 1.;
 
-        let shorter = self.length_variation * (0.6 * clump_height + 0.4 * spread(1.).abs());
+        let shorter = self.length_variation * (0.6 * clump_height * clump_height + 0.4 * spread(1.).abs());
         let top = height * self.length * (1. - shorter);
         let swirl = gradient((root * 2.).extend(0.5), [2; 2], seed);
         let stray = self.direction_variation.to_radians() * (0.35 * clump_turn + 1.2 * swirl + spread(0.25));

@@ -19,7 +19,7 @@ keys! {
     Rocks {
         /// Radius of the largest stones, in tile widths.
         largest: f32 = 0.15, 0.01..=0.3;
-        /// Radius of the smallest stones, in tile widths.
+        /// Radius of the smallest stones, in tile widths; at most `largest` counts.
         smallest: f32 = 0.025, 0.005..=0.3;
         /// How many stones are thrown; those that fall on others do not stay.
         throws: u32 = 4000, 0..=50_000;
@@ -37,9 +37,9 @@ keys! {
         occlusion: f32 = 0.9, 0.0..=1.0;
         /// How much the stones are mottled.
         mottling: f32 = 0.6, 0.0..=1.0;
-        /// Colours of the stones run from this one
+        /// Colour of the lightest stones; the others lie between this and `dark_colour`.
         light_colour: Colour = srgb(0xb9b2a4);
-        /// to this one.
+        /// Colour of the darkest stones.
         dark_colour: Colour = srgb(0x6f675f);
         /// The colour of some of the stones.
         accent_colour: Colour = srgb(0x96785e);
@@ -119,7 +119,7 @@ impl Rocks {
         let light = 1. - 0.7 * self.occlusion;
         for (index, texel) in slice.iter_mut().enumerate() {
             let position = grid.position(index % grid.size[0], index / grid.size[0], k);
-            let noise = soil.gradient(position, seed ^ 0x77);
+            let noise = soil.gradient(position.with_z(0.), seed ^ 0x77);
             let colour = self.ground_colour.0 * light * (1. + noise);
             lay_over(texel, colour, grid.coverage(above - relief * noise));
         }

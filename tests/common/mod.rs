@@ -1,0 +1,77 @@
+//! What the tests that draw share: a watched device, and scenes without a file.
+#![allow(dead_code, reason = "each test binary uses its own part")]
+
+use std::sync::Arc;
+
+use glam::DVec3;
+use mesoshell::frame::Frame;
+use mesoshell::gpu::{DeviceChoice, Messages};
+use mesoshell::mesh::Mesh;
+use mesoshell::method::{self, Method, Setup};
+use mesoshell::progress::{Interrupt, Progress, Silent};
+use mesoshell::scene::{Camera, March, Medium, Scene, View};
+use mesoshell::shell::{Shell, ShellOptions};
+use mesoshell::volume::{Pyramid, Volume};
+
+/// A method under the eyes of the validation layers, synchronization validation included: any message, the device's
+/// end included, fails the test. A test without a Vulkan driver or without the layers fails too, and says what to install.
+pub struct Watched {
+    method: Option<Box<dyn Method>>,
+    messages: Messages,
+}
+
+impl Watched {
+    pub fn prepare(name: &str, scene: &Arc<Scene>) -> Self {
+        let messages = Messages::default();
+        let progress: Arc<dyn Progress> = Arc::new(Silent);
+        let setup = Setup {
+            device: &DeviceChoice::Any,
+            validation: Some(&messages),
+            progress: &progress,
+            interrupt: &Interrupt::default(),
+        };
+        let entry = method::by_name(name).expect("a known method");
+        let method =
+            (entry.prepare)(scene.clone(), &setup).unwrap_or_else(|error| panic!("{error}\n{error:?}"));
+        Self { method: Some(method), messages }
+    }
+
+    pub fn render(&mut self, view: &View) -> Frame {
+        let method = self.method.as_mut().expect("present until dropped");
+        method.render(view).unwrap_or_else(|error| panic!("{error}"))
+    }
+}
+
+impl Drop for Watched {
+    fn drop(&mut self) {
+        self.method = None;
+        let messages = self.messages.all();
+        if !std::thread::panicking() {
+            assert!(messages.is_empty(), "the validation layers said:\n{}", messages.join("\n"));
+        }
+    }
+}
+
+/// A scene in a one-texel medium: `alpha` over `opacity_distance`, grey of the brightness `colour`.
+pub fn constant_scene(mesh: &Mesh, thickness: f64, alpha: f32, colour: f32, view: View) -> Scene {
+    let shell = Shell::build(mesh, &ShellOptions::new(thickness)).expect("a shell");
+    let texel = [colour * alpha, colour * alpha, colour * alpha, alpha];
+    Scene {
+        shell,
+        volume: Pyramid::build(Volume { size: [1, 1, 1], texels: vec![texel] }),
+        medium: Medium { opacity_distance: thickness, lod_footprint: 1.0 },
+        view,
+        march: March::Default { step: 0.5 },
+    }
+}
+
+/// A square view of `pixels` a side.
+pub fn view(eye: DVec3, target: DVec3, fov_degrees: f64, near: f64, pixels: u32) -> View {
+    let up = if (target - eye).normalize().y.abs() > 0.99 { DVec3::X } else { DVec3::Y };
+    View {
+        camera: Camera { eye, target, up, fov_y: fov_degrees.to_radians(), near },
+        width: pixels,
+        height: pixels,
+        depth: false,
+    }
+}

@@ -1,0 +1,93 @@
+//! Host and GLSL layouts are the same: member offsets and strides, read from the SPIR-V.
+
+use std::collections::HashMap;
+use std::mem::offset_of;
+
+use mesoshell::gpu::shaders;
+use mesoshell::method::shell::ViewConstants;
+use mesoshell::method::shell::seen::Cell;
+use rspirv::binary::parse_words;
+use rspirv::dr::{Instruction, Loader, Module, Operand};
+use rspirv::spirv::{Decoration, Op};
+
+/// Name and offset of each member of the struct type `name`, and the stride of arrays of it, if there are any.
+fn layout(words: &[u32], name: &str) -> (Vec<(String, u32)>, Option<u32>) {
+    let mut loader = Loader::new();
+    parse_words(words, &mut loader).expect("glslang wrote it");
+    let module: Module = loader.module();
+    let id_of = |operand: &Operand| operand.unwrap_id_ref();
+    let id = module
+        .debug_names
+        .iter()
+        .filter(|i| i.class.opcode == Op::Name && i.operands[1].unwrap_literal_string() == name)
+        .map(|i| id_of(&i.operands[0]))
+        .find(|id| {
+            module
+                .annotations
+                .iter()
+                .any(|i| i.class.opcode == Op::MemberDecorate && id_of(&i.operands[0]) == *id)
+        })
+        .unwrap_or_else(|| panic!("no struct {name} with a layout"));
+    let names: HashMap<u32, String> = module
+        .debug_names
+        .iter()
+        .filter(|i| i.class.opcode == Op::MemberName && id_of(&i.operands[0]) == id)
+        .map(|i| (i.operands[1].unwrap_literal_bit32(), i.operands[2].unwrap_literal_string().to_owned()))
+        .collect();
+    let is_offset = |i: &&Instruction| {
+        i.class.opcode == Op::MemberDecorate
+            && id_of(&i.operands[0]) == id
+            && i.operands[2] == Operand::Decoration(Decoration::Offset)
+    };
+    let mut members: Vec<(u32, u32)> = module
+        .annotations
+        .iter()
+        .filter(is_offset)
+        .map(|i| (i.operands[1].unwrap_literal_bit32(), i.operands[3].unwrap_literal_bit32()))
+        .collect();
+    members.sort_unstable();
+    let array = module
+        .types_global_values
+        .iter()
+        .find(|i| i.class.opcode == Op::TypeRuntimeArray && id_of(&i.operands[0]) == id)
+        .and_then(|i| i.result_id);
+    let stride = array.and_then(|array| {
+        module
+            .annotations
+            .iter()
+            .find(|i| {
+                i.class.opcode == Op::Decorate
+                    && id_of(&i.operands[0]) == array
+                    && i.operands[1] == Operand::Decoration(Decoration::ArrayStride)
+            })
+            .map(|i| i.operands[2].unwrap_literal_bit32())
+    });
+    (members.into_iter().map(|(index, offset)| (names[&index].clone(), offset)).collect(), stride)
+}
+
+/// The same of a host struct.
+macro_rules! host {
+    ($type:ty: $($member:ident),+) => {
+        vec![$((stringify!($member).to_owned(), offset_of!($type, $member) as u32)),+]
+    };
+}
+
+#[test]
+fn shell_structs_agree() {
+    let constants = host!(ViewConstants: centre, pixel, near, texels, last_level, lod_scale, per_opacity_distance, step, samples);
+    // The vertex shader reads no constants, but the fragment shaders do.
+    for words in [shaders::SHELL_FRAG, shaders::SHELL_DEPTH_FRAG] {
+        assert_eq!(layout(words, "View").0, constants);
+    }
+    let (members, stride) = layout(shaders::SHELL_VERT, "Cell");
+    assert_eq!(members, host!(Cell: outline, planes, texture, texels_per_unit));
+    assert_eq!(stride, Some(size_of::<Cell>() as u32));
+}
+
+#[test]
+fn a_wrong_member_is_noticed() {
+    let (mut members, _) = layout(shaders::SHELL_VERT, "Cell");
+    assert_eq!(members.len(), 4);
+    members[1].1 += 4;
+    assert_ne!(members, host!(Cell: outline, planes, texture, texels_per_unit));
+}
