@@ -25,11 +25,9 @@ impl Talk {
             stdout.flush()
         });
         match written {
-            Err(error) if error.kind() != ErrorKind::BrokenPipe => Err(Error::Output {
-                path: "standard output".into(),
-                message: error.to_string(),
-                help: None,
-            }),
+            Err(error) if error.kind() != ErrorKind::BrokenPipe => {
+                Err(Error::Output { path: "standard output".into(), message: error.to_string(), help: None })
+            }
             _ => Ok(()),
         }
     }

@@ -11,7 +11,9 @@ use serde::Deserialize;
 use toml::Spanned;
 
 use super::camera::DEFAULT_FOV_DEGREES;
-use super::number::{Exactly, FieldOfView, Finite, Fraction, NotNegative, PictureSize, Pixels, Positive, Rounds, Samples};
+use super::number::{
+    Exactly, FieldOfView, Finite, Fraction, NotNegative, PictureSize, Pixels, Positive, Rounds, Samples,
+};
 use crate::mesh::generate::Generator;
 use crate::mesh::projection::Projection;
 use crate::volume::TransferFunction;

@@ -203,3 +203,221 @@ fn camera(text: &Text, section: &CameraSection) -> Result<Camera> {
     let near = section.near.map_or(DEFAULT_NEAR * distance, |near| near.0);
     Ok(Camera { eye, target, up, fov_y: section.fov.0.to_radians(), near })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SCENE: &str = r#"
+[mesh]
+generator = "torus"
+segments = 8
+rings = 4
+
+[shell]
+thickness = 0.1
+
+[volume]
+recipe = "fog.toml"
+"#;
+
+    /// A folder with the recipe that [`SCENE`] names, of 4 x 4 x 4 texels.
+    fn folder() -> tempfile::TempDir {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("fog.toml"), "recipe = \"fog\"\nsize = [4, 4, 4]\n").unwrap();
+        folder
+    }
+
+    fn loaded(overrides: &[&str]) -> Result<Loaded> {
+        let overrides: Vec<_> = overrides.iter().map(|&text| text.to_owned()).collect();
+        build(&Text::new("scene.toml", SCENE.to_owned(), &overrides)?, folder().path(), &Silent)
+    }
+
+    #[test]
+    fn what_is_left_out_has_its_default() {
+        let Loaded { scene, background, .. } = parse("scene.toml", SCENE, folder().path()).unwrap();
+        let expected = Scene::new(scene.shell.clone(), scene.volume.clone(), 0.1 / 4.0);
+        assert_eq!((scene.view, scene.medium, scene.march), (expected.view, expected.medium, expected.march));
+        assert_eq!(background, None);
+    }
+
+    #[test]
+    fn overrides_replace_and_add_values() {
+        let overrides = [
+            "mesh.rings=5",
+            "shell.uv_scale=[2, 3.5]",
+            "volume.opacity_distance=1",
+            "march.plan=paper",
+            "march={samples=3}",
+            "image.background=[0, 0.5, 1]",
+            "camera={eye=[0,0,9],target=[0,0,0],fov=90}",
+            "camera.near = 2",
+        ];
+        let Loaded { scene, background, .. } = loaded(&overrides).unwrap();
+        assert_eq!(scene.shell.topology.tetrahedra.len(), 3 * 2 * 8 * 5);
+        assert_eq!(scene.medium.opacity_distance, 1.0);
+        assert_eq!(scene.march, March::Paper { samples: 3 });
+        assert_eq!(background, Some([0.0, 0.5, 1.0]));
+        assert_eq!((scene.view.camera.eye.z, scene.view.camera.near), (9.0, 2.0));
+        assert_eq!(scene.view.camera.fov_y, std::f64::consts::FRAC_PI_2);
+        // A row of the five spans a fifth of the texture's 3.5 repeats.
+        let mut v = scene.shell.texture[0].map(|uvw| uvw.y);
+        v.sort_by(f64::total_cmp);
+        assert!((v[3] - v[0] - 3.5 / 5.0).abs() < 1e-12);
+    }
+
+    /// What is replaced in [`SCENE`] by what, the spot that must be underlined, a part of the message.
+    const MISTAKES: &[[&str; 4]] = &[
+        ["segments", "segmens", "segmens", "unknown key `segmens`"],
+        ["\"torus\"", "\"tours\"", "\"tours\"", "unknown name `tours`"],
+        ["= 8", "= 2", "2", "`segments` is 2"],
+        ["= 8", "= \"x\"", "\"x\"", "expected a whole number"],
+        ["generator = \"torus\"\nsegments = 8\nrings = 4", "", "[mesh]", "either `generator`"],
+        ["segments", "file = 'x'\nsegments", "file", "unknown key `file`"],
+        ["= 0.1", "= nan", "nan", "greater than 0"],
+        ["= 0.1", "= -inf", "-inf", "greater than 0"],
+        ["= 0.1", "= -1", "-1", "greater than 0"],
+        ["= 0.1", "= 'thick'", "'thick'", "greater than 0"],
+        ["thickness = 0.1", "", "[shell]", "missing key `thickness`"],
+        ["[shell]\nthickness = 0.1", "", "", "missing key `shell`"],
+        ["0.1", "0.1\nuv_scale = [1, nan]", "nan", "a finite number"],
+        ["0.1", "0.1\nuv_scale = [1, 1, 1]", "[1, 1, 1]", "a list of 2"],
+        ["0.1", "0.1\nsmoothing = 1.5", "1.5", "a whole number from 0"],
+        ["recipe =", "file = 'x'\nrecipe =", "[volume]", "either `recipe`"],
+        ["recipe =", "opacity_distance = 0\nrecipe =", "0", "greater than 0"],
+        ["recipe =", "lod_footprint = -0.1\nrecipe =", "-0.1", "at least 0"],
+        ["[volume]", "[volume", "", "unclosed table"],
+        ["[mesh]", "[image]\nsize = [0, 9]\n[mesh]", "0", "from 1 to 32768"],
+        ["[mesh]", "[image]\nsize = [9, 32769]\n[mesh]", "32769", "from 1 to 32768"],
+        ["[mesh]", "[image]\nsize = [32768, 32768]\n[mesh]", "[32768, 32768]", "2^28 pixels"],
+        ["[mesh]", "[image]\nbackground = [0, -1, 0]\n[mesh]", "-1", "at least 0"],
+        ["[mesh]", "[march]\nplan = 'papr'\n[mesh]", "'papr'", "`default` or `paper`"],
+        ["[mesh]", "[march]\nsamples = 0\n[mesh]", "0", "from 1 to 4096"],
+        ["[mesh]", "[march]\nstep = 0\n[mesh]", "0", "greater than 0"],
+        ["[mesh]", "[camera]\neye = [0, 0, 1]\n[mesh]", "[camera]", "missing key `target`"],
+        [
+            "[mesh]",
+            "[camera]\neye = [1, 2, 3]\ntarget = [1, 2, 3.0]\n[mesh]",
+            "[1, 2, 3.0]",
+            "other than the eye",
+        ],
+        ["[mesh]", "[camera]\neye = [0, 2, 1]\ntarget = [0, 1, 1]\n[mesh]", "[0, 1, 1]", "line of sight"],
+        [
+            "[mesh]",
+            "[camera]\neye = [0, 0, 1]\ntarget = [0, 0, 0]\nup = [0, 0, 9]\n[mesh]",
+            "[0, 0, 9]",
+            "line of sight",
+        ],
+        [
+            "[mesh]",
+            "[camera]\neye = [0, 0, 1]\ntarget = [0, 0, 0]\nfov = 180\n[mesh]",
+            "180",
+            "between 0 and 180",
+        ],
+        ["[mesh]", "[camera]\neye = [0, 0, 1]\ntarget = [0, 0, 0]\nnear = 0\n[mesh]", "0", "greater than 0"],
+    ];
+
+    #[test]
+    fn every_mistake_is_underlined() {
+        for [from, to, spot, part] in MISTAKES {
+            let text = SCENE.replacen(from, to, 1);
+            assert_ne!(text, SCENE, "{from}");
+            let error = parse("scene.toml", &text, folder().path()).map(drop).unwrap_err();
+            assert!(error.to_string().contains(part), "{to}: {error}");
+            let Error::Text { source_code, span, label, .. } = error else { panic!("{to}: {error}") };
+            assert_eq!(&source_code.inner()[span.offset()..span.offset() + span.len()], *spot, "{to}");
+            assert!(!label.is_empty());
+        }
+    }
+
+    #[test]
+    fn a_bad_override_is_blamed_itself() {
+        let mistakes = [
+            ("shell.thickness=-1", "greater than 0"),
+            ("shell.thickness=thick", "greater than 0"),
+            ("shel.thickness=1", "unknown key `shel`"),
+            ("mesh.segments=2", "`segments` is 2"),
+            ("mesh.generator=tours", "unknown name `tours`"),
+            ("shell.thickness", "no `=`"),
+            ("shell=1", "is a section"),
+            ("shell.thickness.x=1", "is a value"),
+            ("image.size=[1, 2", "unclosed array"),
+            ("mesh.file=", "value"),
+            ("[shell]\nthickness=1", "not a dotted key"),
+            ("camera.eye=[0,0,1]", "missing key `target`"),
+        ];
+        for (text, part) in mistakes {
+            // One that is right stands before, so that blame must find its way.
+            let error = loaded(&["march.step=0.25", text, "image.size=[9, 9]"]).map(drop).unwrap_err();
+            let message = error.to_string();
+            assert!(matches!(error, Error::Usage { .. }), "{text}: {message}");
+            assert!(message.starts_with(&format!("-D {text}: ")) && message.contains(part), "{message}");
+        }
+    }
+
+    #[test]
+    fn a_mistake_in_the_file_is_not_blamed_on_an_override() {
+        let text = Text::new("scene.toml", SCENE.replace("0.1", "0"), &["mesh.rings=9".to_owned()]).unwrap();
+        assert!(matches!(build(&text, folder().path(), &Silent), Err(Error::Text { .. })));
+    }
+
+    #[test]
+    fn files_that_a_scene_names_are_named_in_errors() {
+        let generator = "generator = \"torus\"\nsegments = 8\nrings = 4";
+        let scenes = [
+            (SCENE.replace("fog.toml", "nowhere.toml"), "nowhere.toml"),
+            (SCENE.replace("recipe = \"fog.toml\"", "file = \"nowhere.nrrd\""), "nowhere.nrrd"),
+            (SCENE.replace(generator, "file = \"nowhere.obj\""), "nowhere.obj"),
+        ];
+        for (scene, file) in scenes {
+            let error = parse("scene.toml", &scene, folder().path()).map(drop).unwrap_err();
+            assert_eq!(error.exit_code(), 3);
+            assert!(error.to_string().contains(file), "{error}");
+        }
+    }
+
+    const DOCUMENTATION: &str = include_str!("../../docs/scene.md");
+
+    #[test]
+    fn the_documented_scene_is_one() {
+        let mut blocks =
+            DOCUMENTATION.split("```toml\n").skip(1).map(|block| block.split("```").next().unwrap());
+        let scene = blocks.next().unwrap();
+        Text::new("docs", scene.to_owned(), &[]).unwrap().parse::<SceneFile>(("mesh", "generator")).unwrap();
+        let transfer = blocks.next().unwrap();
+        let scene = SCENE.replace("recipe", "file") + transfer;
+        Text::new("docs", scene, &[]).unwrap().parse::<SceneFile>(("mesh", "generator")).unwrap();
+    }
+
+    /// The keys of a section as the reader lists them when it meets an unknown one.
+    fn keys(section: &str) -> Vec<String> {
+        let text = Text::new("keys", SCENE.to_owned(), &[format!("{section}.unknown_key=1")]).unwrap();
+        let message = text.parse::<SceneFile>(("mesh", "generator")).unwrap_err().to_string();
+        let (_, expected) = message.split_once(", expected ").unwrap_or_else(|| panic!("{message}"));
+        expected.split('`').skip(1).step_by(2).map(str::to_owned).collect()
+    }
+
+    #[test]
+    fn every_key_is_documented() {
+        let mut found = 0;
+        for section in ["shell", "volume", "camera", "image", "march"] {
+            let (_, documented) = DOCUMENTATION.split_once(&format!("\n## `[{section}]`")).unwrap();
+            let documented = documented.split("\n## ").next().unwrap();
+            for key in keys(section) {
+                assert!(documented.contains(&format!("\n| `{key}` |")), "{section}.{key}");
+                found += 1;
+            }
+        }
+        assert_eq!(found, 4 + 6 + 5 + 2 + 3);
+        for generator in ["plane", "tube", "sphere", "torus", "vase", "teapot"] {
+            let scene = format!("[mesh]\ngenerator = \"{generator}\"\nunknown_key = 1");
+            let text = Text::new("keys", scene, &[]).unwrap();
+            let message = text.parse::<SceneFile>(("mesh", "generator")).unwrap_err().to_string();
+            let (_, row) = DOCUMENTATION.split_once(&format!("\n| `{generator}` |")).unwrap();
+            let row = row.lines().next().unwrap();
+            for key in message.split_once(", expected ").unwrap().1.split('`').skip(1).step_by(2) {
+                assert!(row.contains(&format!("`{key}` ")), "{generator}.{key}");
+            }
+        }
+    }
+}

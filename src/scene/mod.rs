@@ -1,4 +1,20 @@
-//! The scene: what is rendered, from where, and how finely.
+//! The scene: what is rendered, from where, and how finely. It comes from a [`file`], or is put together by hand:
+//!
+//! ```
+//! use mesoshell::mesh::generate::{Generator, Torus};
+//! use mesoshell::scene::Scene;
+//! use mesoshell::shell::{Shell, ShellOptions};
+//! use mesoshell::volume::{Pyramid, Volume};
+//!
+//! let mesh = Generator::Torus(Torus::default()).build()?;
+//! let shell = Shell::build(&mesh, &ShellOptions { thickness: 0.2, ..Default::default() })?;
+//! let half_opaque_orange = Volume::new([1, 1, 1], vec![[0.5, 0.2, 0.0, 0.5]])?;
+//! let mut scene = Scene::new(shell, Pyramid::build(half_opaque_orange), 0.2);
+//! (scene.view.width, scene.view.height) = (64, 64);
+//! let frame = mesoshell::method::render(scene)?;
+//! assert!(frame.image.rgba.iter().any(|[.., alpha]| *alpha > 0.4));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 pub mod camera;
 pub mod file;

@@ -123,6 +123,10 @@ impl TryFrom<Exactly<2, Pixels>> for PictureSize {
 
     fn try_from(Exactly(size): Exactly<2, Pixels>) -> Result<Self, Self::Error> {
         let pixels: u64 = size.iter().map(|side| u64::from(side.0)).product();
-        if pixels <= 1 << 28 { Ok(Self(size)) } else { Err("too large a picture, expected at most 2^28 pixels") }
+        if pixels <= 1 << 28 {
+            Ok(Self(size))
+        } else {
+            Err("too large a picture, expected at most 2^28 pixels")
+        }
     }
 }
