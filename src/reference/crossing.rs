@@ -192,3 +192,45 @@ impl BHShape<f64, 3> for PaddedBox {
         self.node
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec2;
+
+    use super::*;
+    use crate::mesh::generate::{Generator, Torus};
+    use crate::scene::Camera;
+    use crate::shell::ShellOptions;
+
+    #[test]
+    fn neighbours_share_the_end_of_their_crossings_bit_for_bit() {
+        let mesh = Generator::Torus(Torus { segments: 20, rings: 9, ..Torus::default() }).build().unwrap();
+        let mut shell = Shell::build(&mesh, &ShellOptions::new(0.1)).unwrap();
+        let eye = DVec3::new(0.3, 2.0, 2.2);
+        let camera = Camera { eye, target: DVec3::ZERO, up: DVec3::Y, fov_y: 0.7, near: 0.1 };
+        let view = View { camera, width: 40, height: 40, depth: false };
+        let mismatches = |shell: &Shell| {
+            let crossings = Crossings::new(shell, &view);
+            let (mut list, mut shared, mut mismatches) = (Vec::new(), 0, 0);
+            for i in 0..1600 {
+                let point = DVec2::new(f64::from(i % 40), f64::from(i / 40));
+                crossings.find(view.ray_at_unit_depth(point), &mut list);
+                for pair in list.windows(2) {
+                    // The torus is seen through twice, with a gap.
+                    if pair[1].enter - pair[0].exit < 1e-6 {
+                        shared += 1;
+                        mismatches += u32::from(pair[1].enter != pair[0].exit);
+                    }
+                }
+            }
+            assert!(shared > 3000, "{shared}");
+            mismatches
+        };
+        assert_eq!(mismatches(&shell), 0);
+        // Strangers to each other, cells round on their own.
+        let mut topology = (*shell.topology).clone();
+        topology.neighbours.fill([EXTERIOR; 4]);
+        shell.topology = topology.into();
+        assert!(mismatches(&shell) > 100);
+    }
+}

@@ -8,26 +8,32 @@
 //! `T = exp(-depth)`. The panel is halved while the nested coarse rule disagrees.
 //!
 //! # The promise
-//! A panel passes when its error is at most `tolerance / 2 (length / ray's length + 1e-5)`; the first terms add up to
-//! `tolerance / 2` and so do the second ones for any ray of fewer than 1e5 panels. The error of
-//! a panel is weighted by the transmittance before it, and an error of its own transmittance by the largest
-//! colour that may follow.
+//! A panel passes when its error is at most `tolerance / 2 (length / ray's length + 1e-5)`: the first terms
+//! add up to `tolerance / 2`, and so do the second ones on a ray of fewer than 1e5 panels. The error of a
+//! panel is weighted by the transmittance before it, and the error of its own transmittance by the
+//! brightest colour that may follow.
 //!
 //! # Where alpha reaches 1
-//! `1 - alpha` is a cubic, so at a point at distance `x` from a root it is at least about `x^3`, and a panel of length
-//! `h` at the root holds an optical depth of at most `3 h (1 + ln(1 / h)) / opacity_distance` (`h` as a part
-//! of the piece inside the logarithm). Halving towards the root is therefore graded: each step adds one smooth
-//! panel that passes, and the one that does not shrinks until its whole content is below the second
-//! term, after some 35 steps. Where rounding leaves no midpoint (`h` below 1e-15 of the piece) it is taken as it is: by
-//! the same bound what is left is below 1e-13 for pieces of one `opacity_distance`.
+//! On a piece `1 - alpha` is a cubic. Beside a root it falls off like `x^3` at most (`x` as a part of the
+//! piece), so a panel of width `h` at a root holds an optical depth of the order of `3 h (1 + ln(1 / h))`
+//! times the piece's length in opacity distances. Halving towards the root is graded: each step leaves one
+//! smooth panel, which passes, and one at the root, whose share shrinks with `h` until its error is below
+//! the second term, after some 40 steps. Halving ends in any case at a width of 1e-15: by the same estimate
+//! what such a panel holds, all of it, is about 1e-13 where a piece is one opacity distance long.
 
 use glam::DVec3;
 
 use super::crossing::Crossing;
 use super::quadrature::{AtNodes, NODES, Rule, dot};
-use super::texture::{ALPHA, CLEAR, Cubic, Lattice};
+use super::texture::{ALPHA, CLEAR, Cubic, Lattice, Texel};
 use super::{Counts, Reference, Sample};
 use crate::scene::Scene;
+
+/// Width, as a part of its piece, of the panels that are taken as they are: see the head of this file.
+const NARROWEST: f64 = 1e-15;
+
+/// The share of the tolerance that every panel may use, however short it is.
+const SHARE_OF_EACH: f64 = 1e-5;
 
 /// One tetrahedron's medium along a span in which its levels do not change.
 struct Layer<'a> {
@@ -74,7 +80,7 @@ pub(super) struct RayIntegral<'a> {
     detail_per_texel: f64,
     tolerance: f64,
     brightness: f64,
-    /// In depth; counts overlapping tetrahedra once each.
+    /// In depth, summed over tetrahedra.
     total_length: f64,
     layers: Vec<Layer<'a>>,
     transmittance: f64,
@@ -241,9 +247,9 @@ impl<'a> RayIntegral<'a> {
     fn panels(&mut self, piece: Piece, low: f64, high: f64) {
         let panel = self.panel(piece, low, high);
         let width = high - low;
-        let share = width * piece.length / self.total_length + 1e-5;
+        let share = width * piece.length / self.total_length + SHARE_OF_EACH;
         let middle = low + 0.5 * width;
-        let can_halve = width > 1e-15 && low < middle && middle < high;
+        let can_halve = width > NARROWEST && low < middle && middle < high;
         if can_halve && self.transmittance * panel.error > 0.5 * self.tolerance * share {
             self.panels(piece, low, middle);
             if !self.is_done() {
@@ -326,7 +332,7 @@ impl<'a> Layer<'a> {
     }
 
     /// The texture at `x` (0..1) of the piece, at depth `z`.
-    fn at(&self, x: f64, z: f64) -> super::texture::Texel {
+    fn at(&self, x: f64, z: f64) -> Texel {
         let fine = self.fine_cubic.at(x);
         if self.coarse.is_none() {
             return fine;
@@ -346,5 +352,29 @@ fn extinction_per_alpha(alpha: f64, clear: f64) -> f64 {
         -(-alpha).ln_1p() / alpha
     } else {
         -clear.max(f64::MIN_POSITIVE).ln() / alpha
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::extinction_per_alpha;
+
+    #[test]
+    fn extinction_is_accurate_from_the_faintest_alpha_to_the_last_before_1() {
+        // -ln(1 - a) / a = sum of a^k / (k + 1)
+        for exponent in 0..60 {
+            let alpha = 0.3 * 0.5_f64.powi(exponent);
+            let series: f64 = (0..40).map(|k| alpha.powi(k) / f64::from(k + 1)).sum();
+            let found = extinction_per_alpha(alpha, 1.0 - alpha);
+            assert!((found - series).abs() < 4.0 * f64::EPSILON, "{found} for {series} at {alpha:e}");
+        }
+        for exponent in 1..1000 {
+            let clear = 0.5_f64.powi(exponent);
+            let exact = f64::from(exponent) * std::f64::consts::LN_2 / (1.0 - clear);
+            let found = extinction_per_alpha(1.0 - clear, clear);
+            assert!((found - exact).abs() <= 4.0 * f64::EPSILON * exact, "{found} for {exact}");
+        }
+        assert_eq!(extinction_per_alpha(0.0, 1.0), 1.0);
+        assert!(extinction_per_alpha(1.0, 0.0).is_finite());
     }
 }

@@ -8,13 +8,13 @@
 //!   sigma = -ln(1 - alpha) / opacity_distance  c = P / alpha      (P, alpha): the texture, premultiplied
 //! ```
 //!
-//! - [`crossing`]: which tetrahedra lie on a ray, by a bounding volume hierarchy and clipping;
-//! - [`texture`]: the texture along the ray, a cubic in each cell of texel centres;
-//! - [`quadrature`]: the nested rule of a panel;
-//! - [`integrate`]: the coupled integral along the ray, with its error control.
+//! - `crossing`: which tetrahedra lie on a ray, by a bounding volume hierarchy and clipping;
+//! - `texture`: the texture along the ray, a cubic in each cell of texel centres;
+//! - `quadrature`: the nested rule of a panel;
+//! - `integrate`: the coupled integral along the ray, with its error control.
 //!
-//! Rays are measured by *depth* `z` along the camera's forward axis. Where tetrahedra overlap, in a shell that
-//! intersects itself, their media add. Where all eight corners of a texel cell have alpha 1 is a wall: what
+//! Rays are measured by *depth* `z` along the camera's forward axis. Where tetrahedra overlap, in a shell
+//! that intersects itself, their media add. A texel cell whose eight corners all have alpha 1 is a wall: what
 //! reaches it sees its colour there, and nothing behind it.
 
 mod crossing;
@@ -36,7 +36,7 @@ use crossing::Crossings;
 use integrate::RayIntegral;
 use quadrature::Rule;
 
-/// Largest absolute error of premultiplied red, green, blue and alpha, where colour is at most 1.
+/// Largest absolute error of premultiplied red, green, blue and alpha.
 pub const TOLERANCE: f64 = 1e-9;
 
 /// What one ray sees.
@@ -90,7 +90,7 @@ impl<'a> Reference<'a> {
         }
     }
 
-    /// The same with another largest error than [`TOLERANCE`].
+    /// The same with another largest error than [`TOLERANCE`]; positive. Below 1e-12 rounding rules.
     #[must_use]
     pub fn with_tolerance(self, tolerance: f64) -> Self {
         Self { tolerance, ..self }

@@ -162,3 +162,82 @@ impl<'a> Lattice<'a> {
 fn lerp(a: &Texel, b: &Texel, x: f64) -> Texel {
     std::array::from_fn(|c| (1.0 - x) * a[c] + x * b[c])
 }
+
+#[cfg(test)]
+mod tests {
+    use rand::{RngExt, SeedableRng};
+    use rand_pcg::Pcg32;
+
+    use super::*;
+
+    /// The trilinear filter, term by term.
+    fn filtered(volume: &Volume, texture: DVec3) -> [f64; 4] {
+        let size = volume.size.map(|n| n as i64);
+        let place = texture * DVec3::from_array(volume.size.map(f64::from)) - 0.5;
+        let mut sum = [0.0; 4];
+        for corner in 0..8 {
+            let mut weight = 1.0;
+            let texel: [u32; 3] = std::array::from_fn(|axis| {
+                let far = (corner >> axis) & 1;
+                let part = place[axis] - place[axis].floor();
+                weight *= if far == 1 { part } else { 1.0 - part };
+                let index = place[axis].floor() as i64 + far;
+                (if axis == 2 { index.clamp(0, size[2] - 1) } else { index.rem_euclid(size[axis]) }) as u32
+            });
+            for (sum, value) in sum.iter_mut().zip(volume.texel(texel)) {
+                *sum += weight * f64::from(value);
+            }
+        }
+        sum
+    }
+
+    #[test]
+    fn cubics_are_the_filtered_texture_from_cell_to_cell() {
+        let mut random = Pcg32::seed_from_u64(3);
+        let size = [5, 3, 4];
+        let texels = (0..60).map(|_| [0.0; 4].map(|_: f32| random.random::<f32>())).collect();
+        let volume = Volume { size, texels };
+        for ray in 0..40 {
+            let mut vector = || DVec3::from_array([0.0; 3].map(|_: f64| random.random_range(-1.5..1.5)));
+            // Some start on a plane of texel centres, some run along an axis.
+            let start = if ray % 4 == 0 { DVec3::new(0.7, -0.5, 0.375) } else { vector() };
+            let slope =
+                if ray % 3 == 0 { DVec3::AXES[ray % 9 / 3] * (0.5 - (ray % 2) as f64) } else { vector() };
+            let mut lattice = Lattice::new(&volume, start, slope);
+            let (mut from, mut cells) = (0.0, 0);
+            while from < 1.0 {
+                let to = lattice.next_crossing().min(1.0);
+                if from < to {
+                    let cubic = lattice.cubic(from, to).unwrap();
+                    for x in [0.0, 0.3, 0.5, 1.0] {
+                        let expected = filtered(&volume, start + slope * (from + x * (to - from)));
+                        let found = cubic.at(x);
+                        // Lattice coordinates below 10 are rounded by 2e-15; texels differ by 1 at most.
+                        for c in 0..4 {
+                            assert!((found[c] - expected[c]).abs() < 1e-14, "{found:?} {expected:?}");
+                        }
+                        assert!((found[CLEAR] + found[ALPHA] - 1.0).abs() < 1e-15);
+                    }
+                    cells += 1;
+                }
+                lattice.pass(to);
+                from = to;
+            }
+            let planes = (slope * DVec3::new(5.0, 3.0, 4.0)).abs().element_sum();
+            assert!((f64::from(cells) - 1.0 - planes).abs() <= 3.0, "{cells} cells, {planes} planes");
+        }
+    }
+
+    #[test]
+    fn empty_cells_and_walls_are_known_exactly() {
+        let layer = |alpha: f32| [alpha; 4];
+        let volume = Volume { size: [1, 1, 4], texels: [0.0, 0.0, 1.0, 1.0].map(layer).to_vec() };
+        let mut lattice = Lattice::new(&volume, DVec3::new(0.1, 0.2, 0.0), DVec3::Z);
+        // Texel centres at w = 1/8, 3/8, 5/8, 7/8; below the first and above the last, w clamps.
+        assert_eq!(lattice.cubic(0.0, 0.125), None);
+        assert_eq!(lattice.cubic(0.125, 0.375), None);
+        assert!(!lattice.cubic(0.375, 0.625).unwrap().is_wall());
+        assert!(lattice.cubic(0.625, 0.875).unwrap().is_wall());
+        assert!(lattice.cubic(0.875, 1.0).unwrap().is_wall());
+    }
+}
