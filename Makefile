@@ -1,13 +1,14 @@
 # make demo renders the first picture, make test runs every test; both first install what the machine lacks.
 
 CARGO ?= cargo
+TARGET := $(or $(CARGO_TARGET_DIR),target)
 
 .PHONY: demo test setup setup-test
 
 demo: setup
 	$(CARGO) build --release
 	@mkdir -p out
-	target/release/mesoshell render scenes/fur-sphere.toml -o out/fur-sphere.png
+	$(TARGET)/release/mesoshell render scenes/fur-sphere.toml -o out/fur-sphere.png
 	@echo "the picture is in out/fur-sphere.png"
 
 test: setup-test

@@ -2,15 +2,12 @@
 
 use std::io::{IsTerminal, stderr};
 use std::sync::{Mutex, PoisonError};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use mesoshell::progress::Progress;
 
 use super::{Talk, output};
-
-/// Steps of the bar.
-const STEPS: u64 = 1000;
 
 /// Shows stages and their times. The line is wiped when it goes.
 pub struct Line {
@@ -27,11 +24,11 @@ impl Line {
             true => ProgressDrawTarget::hidden(),
             false => ProgressDrawTarget::stderr(),
         };
-        let bar = ProgressBar::with_draw_target(Some(STEPS), target);
-        // The template is constant; the default style serves if it should ever be wrong.
-        if let Ok(style) = ProgressStyle::with_template("{prefix:.dim} {msg} {bar:24} {elapsed}") {
-            bar.set_style(style);
-        }
+        let bar = ProgressBar::with_draw_target(None, target);
+        bar.set_style(
+            ProgressStyle::with_template("{prefix:.dim}{msg} {elapsed}").expect("a valid template"),
+        );
+        bar.enable_steady_tick(Duration::from_millis(100));
         Self { bar, prints_stages: !is_terminal && !talk.quiet, current: Mutex::new(None) }
     }
 
@@ -42,7 +39,7 @@ impl Line {
         let next = next.map(|name| (name.to_owned(), now));
         let Some((name, start)) = std::mem::replace(&mut *current, next) else { return };
         let finished = format!("{name}: {:.1} ms", 1e3 * (now - start).as_secs_f64());
-        self.bar.set_prefix(format!("{finished} >"));
+        self.bar.set_prefix(format!("{finished}, "));
         if self.prints_stages {
             output::complain(&finished);
         }
@@ -54,11 +51,13 @@ impl Progress for Line {
         self.turn_to(Some(name));
         self.bar.reset_elapsed();
         self.bar.set_message(name.to_owned());
-        self.bar.set_position(0);
     }
 
     fn fraction(&self, done: f64) {
-        self.bar.set_position((done.clamp(0.0, 1.0) * STEPS as f64) as u64);
+        let current = self.current.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((name, _)) = &*current {
+            self.bar.set_message(format!("{name} {:.0} %", 100.0 * done.clamp(0.0, 1.0)));
+        }
     }
 }
 

@@ -3,7 +3,7 @@
 //! # In code
 //!
 //! [`SceneFile`] is what such a text says, read and checked key by key, before any file that it names is
-//! opened; [`load`](crate::scene::load) makes a scene of it.
+//! opened; [`load`](crate::scene::load()) makes a scene of it.
 
 use std::path::PathBuf;
 

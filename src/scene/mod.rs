@@ -1,4 +1,5 @@
-//! The scene: what is rendered, from where, and how finely. It comes from a [`file`], or is put together by hand:
+//! The scene: what is rendered, from where, and how finely. It comes from a [`mod@file`], or is put
+//! together by hand:
 //!
 //! ```
 //! use mesoshell::mesh::generate::{Generator, Torus};
