@@ -138,10 +138,7 @@ fn extreme_keys_make_sound_volumes() {
         ("fog", "depth = 0\nscale = 1\noctaves = 1\ncontrast = 0\nswirl = 0\nreach = 0.05\nheight = 0.01"),
         ("clouds", "coverage = 1\ndepth = 200\nscale = 64\nbillows = 256\nsoftness = 1\nbottom = 0.9"),
         ("clouds", "coverage = 0\ndepth = 0\nscale = 1\nbillows = 1\nsoftness = 0\nbottom = 0"),
-        (
-            "fur",
-            "density = 2000\nlength_variation = 1\nthickness = 0.05\ncurl = 0.2\nlean = 4\nclumping = 1",
-        ),
+        ("fur", "density = 2000\nlength_variation = 1\nthickness = 0.05\ncurl = 0.2\nlean = 4\nclumping = 1"),
         ("fur", "density = 0"),
         (
             "fur",

@@ -76,7 +76,8 @@ pub fn run(arguments: Arguments, talk: Talk) -> Result<()> {
 fn render(arguments: &Arguments, progress: &Arc<dyn Progress>, interrupt: &Interrupt) -> Result<Rendered> {
     let scene = &arguments.scene;
     let output = arguments.output.clone().unwrap_or_else(|| {
-        PathBuf::from(scene.file_stem().unwrap_or(scene.as_os_str())).with_added_extension("png")
+        let stem = scene.file_stem().unwrap_or("scene".as_ref());
+        PathBuf::from(stem).with_added_extension("png")
     });
     file::check_writable(&output)?;
 

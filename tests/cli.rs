@@ -1,0 +1,321 @@
+//! The command line from outside: exit codes, one clear error each, nothing left behind.
+
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Output, Stdio};
+
+use tempfile::TempDir;
+
+const SCENE: &str = r#"[mesh]
+generator = "sphere"
+segments = 8
+rings = 4
+
+[shell]
+thickness = 0.2
+
+[volume]
+recipe = "fog.toml"
+"#;
+
+/// A folder with a small scene, in which the command runs.
+struct Desk(TempDir);
+
+impl Desk {
+    fn new() -> Self {
+        let desk = Self(tempfile::tempdir().unwrap());
+        desk.write("scene.toml", SCENE);
+        desk.write("fog.toml", "recipe = \"fog\"\nsize = [8, 8, 4]\n");
+        desk
+    }
+
+    fn path(&self) -> &Path {
+        self.0.path()
+    }
+
+    fn write(&self, name: &str, content: impl AsRef<[u8]>) {
+        fs::write(self.path().join(name), content).unwrap();
+    }
+
+    fn command(&self, arguments: &[&str]) -> Command {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_mesoshell"));
+        command.args(arguments).current_dir(self.path()).env("NO_COLOR", "1").stdin(Stdio::null());
+        command
+    }
+
+    fn run(&self, arguments: &[&str]) -> Output {
+        self.command(arguments).output().unwrap()
+    }
+
+    /// Names of the files there.
+    fn files(&self) -> Vec<String> {
+        let entries = fs::read_dir(self.path()).unwrap();
+        let mut names: Vec<_> =
+            entries.map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
+        names.sort();
+        names
+    }
+
+    /// Runs what must fail with `code` and one error that has all `parts`, and leave nothing behind.
+    #[track_caller]
+    fn refuses(&self, arguments: &[&str], code: i32, parts: &[&str]) {
+        let before = self.files();
+        let output = self.run(arguments);
+        let errors = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(code), "{arguments:?}: {errors}");
+        assert_eq!(text(&output.stdout), "", "{arguments:?}");
+        for part in parts {
+            assert!(errors.contains(part), "{arguments:?} does not tell {part:?}:\n{errors}");
+        }
+        assert!(!errors.contains("panicked"), "{errors}");
+        assert!(errors.matches('×').count() + errors.matches("error: ").count() == 1, "{errors}");
+        assert_eq!(self.files(), before, "{arguments:?}");
+    }
+
+    /// As [`refuses`](Self::refuses), for a scene that a change turned bad.
+    #[track_caller]
+    fn refuses_scene(&self, from: &str, to: &str, parts: &[&str]) {
+        let bad = SCENE.replacen(from, to, 1);
+        assert_ne!(bad, SCENE);
+        self.write("bad.toml", bad);
+        self.refuses(&["render", "bad.toml", "-o", "picture.png"], 3, parts);
+    }
+}
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8(bytes.to_vec()).unwrap()
+}
+
+/// What draws [`SCENE`] without a device.
+const RENDER: &[&str] = &["render", "scene.toml", "--method", "reference", "-D", "image.size=[16, 16]"];
+
+#[test]
+fn a_scene_becomes_a_picture() {
+    let desk = Desk::new();
+    let output = desk.run(RENDER);
+    assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+    let said = text(&output.stdout);
+    assert_eq!(said.lines().next(), Some("scene.png"));
+    for stage in ["load.mesh", "load.volume", "prepare", "write"] {
+        assert!(said.contains(stage), "{said}");
+    }
+    // Standard error is no terminal here: one plain line a stage.
+    let progress = text(&output.stderr);
+    assert!(progress.lines().any(|line| line.starts_with("building the shell: ")), "{progress}");
+    assert!(progress.lines().all(|line| line.ends_with(" ms")), "{progress}");
+    assert_eq!(desk.files(), ["fog.toml", "scene.png", "scene.toml"]);
+    let picture = image::open(desk.path().join("scene.png")).unwrap().into_rgba8();
+    assert_eq!(picture.dimensions(), (16, 16));
+    assert!(picture.get_pixel(8, 8).0[3] > 0);
+    assert_eq!(picture.get_pixel(0, 0).0, [0; 4]);
+}
+
+#[test]
+fn quiet_is_silent_and_json_is_json() {
+    let desk = Desk::new();
+    let quiet = desk.run(&[RENDER, &["-o", "a.exr", "--quiet"]].concat());
+    assert_eq!(
+        (quiet.status.code(), text(&quiet.stdout), text(&quiet.stderr)),
+        (Some(0), String::new(), String::new())
+    );
+    let json = desk.run(&[RENDER, &["-o", "b.exr", "--json"]].concat());
+    let value: serde_json::Value = serde_json::from_slice(&json.stdout).unwrap();
+    assert_eq!((&value["output"], &value["width"]), (&"b.exr".into(), &16.into()));
+    assert_eq!(value["report"]["method"], "reference");
+    assert!(value["report"]["stages"].as_array().unwrap().len() > 5);
+    // Twice the same scene: the same bytes.
+    assert!(fs::read(desk.path().join("a.exr")).unwrap() == fs::read(desk.path().join("b.exr")).unwrap());
+}
+
+#[test]
+fn a_size_on_the_command_line_counts() {
+    let desk = Desk::new();
+    let output = desk.run(&[RENDER, &["--size", "12x7", "--json"]].concat());
+    let value: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!((&value["width"], &value["height"]), (&12.into(), &7.into()));
+    assert_eq!(image::image_dimensions(desk.path().join("scene.png")).unwrap(), (12, 7));
+}
+
+#[test]
+fn overrides_and_backgrounds_show() {
+    let desk = Desk::new();
+    let output = desk.run(&[RENDER, &["-o", "picture.png", "-D", "image.background=[0, 0, 1]"]].concat());
+    assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+    let picture = image::open(desk.path().join("picture.png")).unwrap().into_rgba8();
+    assert_eq!(picture.get_pixel(0, 0).0, [0, 0, 255, 255]);
+}
+
+#[test]
+fn diff_tells_images_apart() {
+    let desk = Desk::new();
+    for (name, thickness) in [("a.exr", "shell.thickness=0.2"), ("b.exr", "shell.thickness=0.4")] {
+        assert!(desk.run(&[RENDER, &["-q", "-o", name, "-D", thickness]].concat()).status.success());
+    }
+    let code = |arguments: &[&str]| desk.run(arguments).status.code();
+    assert_eq!(code(&["diff", "a.exr", "a.exr", "--max-rmse", "0"]), Some(0));
+    assert_eq!(code(&["diff", "a.exr", "b.exr"]), Some(0));
+    assert_eq!(code(&["diff", "a.exr", "b.exr", "--max-rmse", "1e-3"]), Some(1));
+    assert_eq!(code(&["diff", "a.exr", "b.exr", "--max-rmse", "nan"]), Some(1));
+    let output = desk.run(&["diff", "a.exr", "b.exr", "--json"]);
+    let value: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(value["pixels"], 256);
+    assert!(value["rmse"].as_f64().unwrap() > 1e-3);
+    desk.refuses(&["diff", "a.exr", "nowhere.exr"], 3, &["nowhere.exr"]);
+    assert!(desk.run(&[RENDER, &["-q", "-o", "c.exr", "-D", "image.size=[8, 8]"]].concat()).status.success());
+    desk.refuses(&["diff", "a.exr", "c.exr"], 2, &["16x16", "8x8"]);
+}
+
+#[test]
+fn info_counts() {
+    let desk = Desk::new();
+    desk.write(
+        "square.obj",
+        "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nf 1/1 2/2 3/3 4/4\n",
+    );
+    let output = desk.run(&["mesh", "info", "square.obj", "--json"]);
+    let value: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!((&value["triangles"], &value["boundary_edges"]), (&2.into(), &4.into()));
+    assert!(text(&desk.run(&["mesh", "info", "square.obj"]).stdout).contains("boundary edges"));
+    desk.write("fog.nrrd", NRRD.to_owned() + "12345678");
+    let output = desk.run(&["volume", "info", "fog.nrrd"]);
+    assert!(text(&output.stdout).contains("2 x 2 x 2"), "{}", text(&output.stderr));
+}
+
+/// The header of 2 x 2 x 2 bytes.
+const NRRD: &str = "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 2 2 2\nencoding: raw\n\n";
+
+#[test]
+fn bad_scenes_are_underlined() {
+    let desk = Desk::new();
+    let spot = |line: &str, at: &str| format!("bad.toml:{line}:{at}");
+    desk.refuses_scene(
+        "thickness",
+        "thicknes",
+        &[&spot("7", "1"), "thicknes = 0.2", "unknown key", "`thickness`"],
+    );
+    desk.refuses_scene("0.2", "\"thick\"", &[&spot("7", "13"), "thickness = \"thick\"", "greater than 0"]);
+    desk.refuses_scene("0.2", "-0.2", &[&spot("7", "13"), "greater than 0"]);
+    desk.refuses_scene("0.2", "nan", &[&spot("7", "13"), "greater than 0"]);
+    desk.refuses_scene("0.2", "inf", &[&spot("7", "13"), "greater than 0"]);
+    desk.refuses_scene("[shell]", "[shell", &[&spot("6", "7")]);
+    desk.refuses_scene("segments = 8", "segments = 2", &[&spot("3", "12"), "`segments` is 2"]);
+}
+
+#[test]
+fn bad_requests_are_told() {
+    let desk = Desk::new();
+    desk.refuses(&["render", "nowhere.toml"], 3, &["nowhere.toml"]);
+    desk.refuses(&["render", "."], 3, &["."]);
+    desk.refuses(&["render"], 2, &["<SCENE>"]);
+    desk.refuses(&["render", "scene.toml", "--method", "magic"], 2, &["magic", "shell", "reference"]);
+    desk.refuses(&["render", "scene.toml", "--size", "16"], 2, &["640x480"]);
+    desk.refuses(&["render", "scene.toml", "--size", "0x16"], 2, &["image.size", "1 to 32768"]);
+    desk.refuses(&["render", "scene.toml", "-D", "shell.thickness"], 2, &["-D shell.thickness", "`=`"]);
+    desk.refuses(&["render", "scene.toml", "-D", "shell.thickness=0"], 2, &["-D shell.thickness=0"]);
+    desk.refuses(&["render", "scene.toml", "-D", "shel.thickness=1"], 2, &["unknown key `shel`"]);
+    desk.write("binary.toml", [0xff, 0xfe, 0x00]);
+    desk.refuses(&["render", "binary.toml"], 3, &["binary.toml"]);
+    desk.write("empty.toml", "");
+    desk.refuses(&["render", "empty.toml"], 3, &["missing key `mesh`"]);
+}
+
+#[test]
+fn an_output_that_cannot_be_is_told_before_anything_is_loaded() {
+    let desk = Desk::new();
+    // The scene does not even exist: had it been looked at first, the code would be another.
+    desk.refuses(&["render", "nowhere.toml", "-o", "nowhere/picture.png"], 6, &["nowhere/picture.png"]);
+    desk.refuses(&["render", "nowhere.toml", "-o", "picture.bmp"], 2, &["picture.bmp"]);
+    fs::create_dir(desk.path().join("folder.png")).unwrap();
+    desk.refuses(&["render", "nowhere.toml", "-o", "folder.png"], 6, &["folder.png"]);
+}
+
+#[test]
+fn files_that_a_scene_names_are_told() {
+    let desk = Desk::new();
+    let generator = "generator = \"sphere\"\nsegments = 8\nrings = 4\n";
+    let recipe = "recipe = \"fog.toml\"";
+    desk.refuses_scene(generator, "file = \"nowhere.obj\"\n", &["nowhere.obj"]);
+    desk.refuses_scene(recipe, "recipe = \"nowhere.toml\"", &["nowhere.toml"]);
+    desk.refuses_scene(recipe, "file = \"nowhere.nrrd\"", &["nowhere.nrrd"]);
+    desk.write("torn.nrrd", NRRD.to_owned() + "1234567");
+    desk.refuses_scene(recipe, "file = \"torn.nrrd\"", &["torn.nrrd"]);
+    desk.refuses(&["volume", "info", "torn.nrrd"], 3, &["torn.nrrd"]);
+    desk.write("greedy.nrrd", NRRD.replace("2 2 2", "65535 65535 65535"));
+    desk.refuses_scene(recipe, "file = \"greedy.nrrd\"", &["greedy.nrrd"]);
+    desk.write("scalar.nrrd", NRRD.to_owned() + "12345678");
+    desk.refuses_scene(recipe, "file = \"scalar.nrrd\"", &["scalar.nrrd", "[volume.transfer]"]);
+    desk.write("torn.obj", "v 0 0 0\nv 1 0\nf 1 2 3\n");
+    desk.refuses_scene(generator, "file = \"torn.obj\"\n", &["torn.obj", "line 2"]);
+    desk.refuses(&["mesh", "info", "torn.obj"], 3, &["torn.obj", "line 2"]);
+    desk.write("bad-recipe.toml", "recipe = \"fog\"\nsise = 3\n");
+    desk.refuses_scene(recipe, "recipe = \"bad-recipe.toml\"", &["bad-recipe.toml:2:1", "sise = 3"]);
+}
+
+#[test]
+fn an_unknown_device_is_told() {
+    let desk = Desk::new();
+    desk.refuses(&["render", "scene.toml", "--quiet", "--device", "no such device"], 4, &["no such device"]);
+}
+
+#[test]
+fn without_a_driver_the_way_to_one_is_told() {
+    let desk = Desk::new();
+    let mut command = desk.command(&["render", "scene.toml", "--quiet"]);
+    let output = command
+        .env("VK_DRIVER_FILES", "nowhere.json")
+        .env("VK_ICD_FILENAMES", "nowhere.json")
+        .output()
+        .unwrap();
+    let errors = text(&output.stderr);
+    assert_eq!(output.status.code(), Some(4), "{errors}");
+    assert!(errors.contains("mesa-vulkan-drivers"), "{errors}");
+}
+
+/// What becomes of a reader that goes after the first line, such as `head -1`.
+#[test]
+fn a_closed_pipe_is_no_error() {
+    let desk = Desk::new();
+    let mut command = desk.command(&[RENDER, &["--json"]].concat());
+    let mut child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    drop(child.stdout.take());
+    let output = child.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(0));
+    assert!(!text(&output.stderr).contains("panicked"));
+}
+
+#[test]
+fn a_full_disk_under_standard_output_is_an_error() {
+    let desk = Desk::new();
+    let full = fs::File::options().write(true).open("/dev/full").unwrap();
+    let mut command = desk.command(RENDER);
+    let output = command.stdout(full).output().unwrap();
+    assert_eq!(output.status.code(), Some(6));
+    assert!(text(&output.stderr).contains("standard output"));
+}
+
+#[test]
+fn an_interrupted_run_leaves_nothing_behind() {
+    let desk = Desk::new();
+    let before = desk.files();
+    // Hours of work, of which the first second is let pass.
+    let arguments = ["render", "scene.toml", "--method", "reference", "--size", "8192x8192"];
+    let mut child = desk.command(&arguments).stderr(Stdio::piped()).spawn().unwrap();
+    let mut progress = std::io::BufReader::new(child.stderr.take().unwrap());
+    let mut line = String::new();
+    while !line.starts_with("filtering the volume") {
+        line.clear();
+        assert!(std::io::BufRead::read_line(&mut progress, &mut line).unwrap() > 0, "ended early");
+    }
+    let killed = Command::new("kill").args(["-TERM", &child.id().to_string()]).status().unwrap();
+    assert!(killed.success());
+    assert_eq!(child.wait().unwrap().code(), Some(130));
+    assert_eq!(desk.files(), before);
+}
+
+#[test]
+fn exit_codes_are_in_the_help() {
+    let help = text(&Desk::new().run(&["--help"]).stdout);
+    for code in ["0 ", "1 ", "2 ", "3 ", "4 ", "5 ", "6 ", "130 "] {
+        assert!(help.lines().any(|line| line.trim_start().starts_with(code)), "{code}: {help}");
+    }
+}
