@@ -18,21 +18,21 @@ layout(set = 0, binding = 1) uniform sampler3D volume; // premultiplied
 
 layout(location = 0) flat in vec4 planes[4];
 layout(location = 4) flat in vec4 texture_rows[3];
-layout(location = 7) flat in float texels_per_unit;
 
 layout(location = 0) out vec4 out_rgba; // premultiplied
 #ifdef DEPTH
 layout(location = 1) out vec4 out_depth; // (distance * alpha, 0, 0, alpha)
 #endif
 
-float level_of_detail(float depth) {
-    return clamp(log2(view.lod_scale * depth * texels_per_unit), 0.0, view.last_level);
+// `detail` is the footprint of the pixel at depth 1 in level-0 texels.
+float level_of_detail(float depth, float detail) {
+    return clamp(log2(depth * detail), 0.0, view.last_level);
 }
 
 // Blends two levels by hand: hardware may round the blend's weight to 8 bits.
-vec4 fetch(vec3 texture_point, float depth) {
+vec4 fetch(vec3 texture_point, float depth, float detail) {
     if (!MINIFIED) return textureLod(volume, texture_point, 0.0);
-    float level = level_of_detail(depth);
+    float level = level_of_detail(depth, detail);
     float fine = floor(level);
     return mix(textureLod(volume, texture_point, fine), textureLod(volume, texture_point, min(fine + 1.0, view.last_level)),
                level - fine);
@@ -55,9 +55,13 @@ void main() {
     float ray_length = length(ray);
     vec3 texture_from_depth = vec3(dot(texture_rows[0].xyz, ray), dot(texture_rows[1].xyz, ray), dot(texture_rows[2].xyz, ray));
     vec3 texture_at_eye = vec3(texture_rows[0].w, texture_rows[1].w, texture_rows[2].w);
+    // Texels across the ray: the pixel has no width along it.
+    vec3 across = view.texels * vec3(length(cross(texture_rows[0].xyz, ray)), length(cross(texture_rows[1].xyz, ray)),
+                                     length(cross(texture_rows[2].xyz, ray)));
+    float detail = view.lod_scale * max(across.x, max(across.y, across.z)) / ray_length;
     uint count = view.samples;
     if (!PAPER_PLAN) {
-        float texel = MINIFIED ? exp2(floor(level_of_detail(0.5 * (entry + exit)))) : 1.0;
+        float texel = MINIFIED ? exp2(floor(level_of_detail(0.5 * (entry + exit), detail))) : 1.0;
         float texels = length(texture_from_depth * view.texels) * (exit - entry) / texel;
         count = uint(clamp(ceil(texels / view.step), 1.0, 65536.0));
     }
@@ -69,7 +73,7 @@ void main() {
     float mean_distance = 0.0;
     for (uint i = 0; i < count; i++) {
         float z = entry + (float(i) + 0.5) * step;
-        vec4 texel = fetch(texture_at_eye + z * texture_from_depth, z);
+        vec4 texel = fetch(texture_at_eye + z * texture_from_depth, z, detail);
         float depth = optical_depth(texel.a) * depth_per_alpha;
         float alpha = opacity(depth);
         // Colour is premultiplied by the texture's alpha; what counts is this step's.

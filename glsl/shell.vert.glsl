@@ -8,7 +8,6 @@ layout(set = 0, binding = 0, std430) readonly buffer Cells { Cell cells[]; }; //
 
 layout(location = 0) flat out vec4 planes[4];
 layout(location = 4) flat out vec4 texture_rows[3];
-layout(location = 7) flat out float texels_per_unit;
 
 const uint CORNERS[6] = uint[](0, 1, 2, 0, 2, 3);
 
@@ -16,7 +15,6 @@ void main() {
     Cell cell = cells[gl_VertexIndex / 6];
     planes = cell.planes;
     texture_rows = cell.texture;
-    texels_per_unit = cell.texels_per_unit;
     uint corner = CORNERS[gl_VertexIndex % 6];
     vec4 pair = cell.outline[corner / 2];
     gl_Position = vec4(corner % 2 == 0 ? pair.xy : pair.zw, 0.0, 1.0);

@@ -6,6 +6,7 @@
 //! `cli -> method -> gpu`, and all of them on the modules that know no device.
 #![forbid(rustdoc::broken_intra_doc_links)]
 
+pub mod bench;
 pub mod error;
 pub mod frame;
 pub mod gpu;

@@ -8,7 +8,7 @@ layout(push_constant, std430) uniform View {
     float near;          // depth of the near plane, world units
     vec3 texels;         // size of level 0 of the volume
     float last_level;
-    float lod_scale;     // footprint of a pixel at depth 1, world units; times depth times texels per unit
+    float lod_scale;     // footprint of a pixel at depth 1, world units
     float per_opacity_distance; // 1 / opacity_distance
     float step;          // `default` plan: texels a sample
     uint samples;        // `paper` plan: samples a tetrahedron
@@ -19,5 +19,4 @@ struct Cell {
     vec4 outline[2];     // four corners in clip space (x, y, x, y), around all that it covers
     vec4 planes[4];      // inside: dot(plane.xyz, point) >= plane.w; the same numbers, negated, in the cell beyond the face
     vec4 texture[3];     // u, v, w of a point: dot(row.xyz, point) + row.w
-    float texels_per_unit; // largest density of level-0 texels, per world unit
 };

@@ -2,6 +2,7 @@
 //!
 //! Standard output carries the result alone, standard error progress, warnings and errors.
 
+mod bench;
 mod devices;
 mod diff;
 mod mesh;
@@ -58,6 +59,7 @@ enum Command {
     #[command(subcommand)]
     Volume(volume::Command),
     Diff(diff::Arguments),
+    Bench(bench::Arguments),
 }
 
 /// Runs what the arguments of this process ask for.
@@ -76,6 +78,7 @@ pub fn run() -> ExitCode {
         Command::Mesh(command) => mesh::run(command, talk).map(|()| ExitCode::SUCCESS),
         Command::Volume(command) => volume::run(command, talk).map(|()| ExitCode::SUCCESS),
         Command::Diff(arguments) => diff::run(arguments, talk),
+        Command::Bench(arguments) => bench::run(arguments, talk).map(|()| ExitCode::SUCCESS),
     };
     done.unwrap_or_else(|error| {
         let code = error.exit_code();

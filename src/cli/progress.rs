@@ -5,7 +5,8 @@ use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use mesoshell::progress::Progress;
+use mesoshell::Error;
+use mesoshell::progress::{Interrupt, Progress};
 
 use super::{Talk, output};
 
@@ -66,4 +67,17 @@ impl Drop for Line {
         self.turn_to(None);
         self.bar.finish_and_clear();
     }
+}
+
+/// Lets the first Ctrl-C or SIGTERM end the run at its next check, and the second one at once.
+pub fn listen(interrupt: &Interrupt) {
+    let interrupt = interrupt.clone();
+    let handler = move || {
+        if interrupt.is_set() {
+            std::process::exit(Error::Interrupted.exit_code().into());
+        }
+        interrupt.set();
+    };
+    // Without a handler the system's own ends the process, which will do.
+    let _ = ctrlc::set_handler(handler);
 }

@@ -13,7 +13,7 @@ use mesoshell::scene::{self, Loaded, View};
 use mesoshell::{Error, Result};
 use serde::Serialize;
 
-use super::progress::Line;
+use super::progress::{Line, listen};
 use super::{Talk, table};
 
 /// Render a scene to a picture
@@ -115,19 +115,6 @@ fn render(arguments: &Arguments, progress: &Arc<dyn Progress>, interrupt: &Inter
     frame.report.stages = stages;
     let View { width, height, .. } = view;
     Ok(Rendered { scene: scene.clone(), output, width, height, report: frame.report })
-}
-
-/// Lets the first Ctrl-C or SIGTERM end the run at its next check, and the second one at once.
-fn listen(interrupt: &Interrupt) {
-    let interrupt = interrupt.clone();
-    let handler = move || {
-        if interrupt.is_set() {
-            std::process::exit(Error::Interrupted.exit_code().into());
-        }
-        interrupt.set();
-    };
-    // Without a handler the system's own ends the process, which will do.
-    let _ = ctrlc::set_handler(handler);
 }
 
 fn methods() -> PossibleValuesParser {

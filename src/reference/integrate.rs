@@ -157,7 +157,9 @@ impl<'a> RayIntegral<'a> {
         let last_level = self.scene.volume.levels.len() - 1;
         let details: Vec<f64> = active
             .iter()
-            .map(|crossing| self.detail_per_texel * self.scene.texels_per_unit(crossing.tetrahedron))
+            .map(|crossing| {
+                self.detail_per_texel * self.scene.texels_across(crossing.tetrahedron, self.direction)
+            })
             .collect();
         let mut start = from;
         while start < to && !self.is_done() {

@@ -26,6 +26,8 @@ mod text;
 pub use camera::{Camera, View};
 pub use load::{Loaded, load, parse};
 
+use glam::DVec3;
+
 use crate::shell::Shell;
 use crate::volume::Pyramid;
 
@@ -53,8 +55,9 @@ pub struct Medium {
     ///
     /// At a point at depth `z` (world units along the camera's forward axis) in a tetrahedron the level of
     /// detail is `log2(lod_footprint * z * pixel * rho)`, clamped to `0..=last level`, where `pixel` is
-    /// [`View::pixel_at_unit_depth`] and `rho` is [`Scene::texels_per_unit`] of that tetrahedron.
-    /// Between integer levels the two levels' premultiplied RGBA are blended linearly.
+    /// [`View::pixel_at_unit_depth`] and `rho` is [`Scene::texels_across`] the ray in that tetrahedron: a pixel is wide
+    /// across the ray, while along it the march sees every texel. Between integer levels the two levels'
+    /// premultiplied RGBA are blended linearly.
     pub lod_footprint: f64,
 }
 
@@ -94,11 +97,12 @@ impl Scene {
         }
     }
 
-    /// The largest density of level-0 texels along any texture axis in a tetrahedron, in texels per
-    /// world unit: `max_i size_i |row_i of texture_from_world|`.
-    pub fn texels_per_unit(&self, tetrahedron: usize) -> f64 {
-        let map = self.shell.cells[tetrahedron].texture_from_world.transpose();
+    /// The largest density of level-0 texels across a ray, along any texture axis in a tetrahedron, in texels
+    /// per world unit: `max_i size_i |row_i of texture_from_world x direction| / |direction|`.
+    pub fn texels_across(&self, tetrahedron: usize, direction: DVec3) -> f64 {
+        let map = self.shell.cells[tetrahedron].texture_from_world;
         let size = self.volume.levels[0].size;
-        (0..3).map(|i| f64::from(size[i]) * map.col(i).length()).fold(0.0, f64::max)
+        let across = (0..3).map(|i| f64::from(size[i]) * map.row(i).cross(direction).length());
+        across.fold(0.0, f64::max) / direction.length()
     }
 }

@@ -158,8 +158,7 @@ fn widened(corners: &Outline, margin: f64) -> Option<Outline> {
     for i in 0..count {
         let edge = polygon[(i + 1) % count] - polygon[i];
         let length = edge.length();
-        // Negated, so that it also catches NaN.
-        if !(length > margin) {
+        if length.is_nan() || length <= margin {
             return None;
         }
         directions[i] = edge / length;

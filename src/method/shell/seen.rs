@@ -17,8 +17,6 @@ pub struct Cell {
     pub outline: [[f32; 4]; 2],
     pub planes: [[f32; 4]; 4],
     pub texture: [[f32; 4]; 3],
-    pub texels_per_unit: f32,
-    pub padding: [f32; 3],
 }
 
 /// All that can be seen, and what cannot.
@@ -41,15 +39,14 @@ impl Seen {
         let eye = Eye::new(scene, view, subpixels);
         let drawn: Vec<u32> =
             sorted.order.sequence.iter().copied().filter(|&t| sorted.exit_faces[t as usize] != 0).collect();
-        let found: Vec<Result<(Cell, f64), Unseen>> =
+        let found: Vec<Result<(Cell, bool), Unseen>> =
             drawn.par_iter().map(|&t| eye.cell(t as usize, sorted.exit_faces[t as usize])).collect();
-        let lod_scale = scene.medium.lod_footprint * view.pixel_at_unit_depth();
         let mut seen =
             Self { cells: Vec::with_capacity(found.len()), before_near: 0, beside: 0, minified: false };
         for cell in found {
             match cell {
-                Ok((cell, depth)) => {
-                    seen.minified |= lod_scale * depth * f64::from(cell.texels_per_unit) > 1.0;
+                Ok((cell, minified)) => {
+                    seen.minified |= minified;
                     seen.cells.push(cell);
                 }
                 Err(Unseen::BeforeNear) => seen.before_near += 1,
@@ -88,8 +85,8 @@ impl<'a> Eye<'a> {
         }
     }
 
-    /// What the shaders need of tetrahedron `t`, and its greatest depth.
-    fn cell(&self, t: usize, exit_faces: u8) -> Result<(Cell, f64), Unseen> {
+    /// What the shaders need of tetrahedron `t`, and whether more than level 0 can be needed in it.
+    fn cell(&self, t: usize, exit_faces: u8) -> Result<(Cell, bool), Unseen> {
         let shell = &self.scene.shell;
         let vertices = shell.vertices_of(t).map(|vertex| self.view_from_world * (vertex - self.position));
         let outline = self.projection.outline(&vertices, exit_faces)?;
@@ -108,13 +105,13 @@ impl<'a> Eye<'a> {
         let texture = std::array::from_fn(|i| {
             texture_from_view.row(i).as_vec3().extend(texture_at_eye[i] as f32).into()
         });
-        let cell = Cell {
-            outline: [[a.x, a.y, b.x, b.y], [c.x, c.y, d.x, d.y]],
-            planes,
-            texture,
-            texels_per_unit: self.scene.texels_per_unit(t) as f32,
-            padding: [0.0; 3],
-        };
-        Ok((cell, vertices.iter().map(|vertex| vertex.z).fold(f64::NEG_INFINITY, f64::max)))
+        let cell = Cell { outline: [[a.x, a.y, b.x, b.y], [c.x, c.y, d.x, d.y]], planes, texture };
+        let farthest = vertices.iter().map(|vertex| vertex.z).fold(f64::NEG_INFINITY, f64::max);
+        // Of all directions, so at least that across the ray.
+        let size = self.scene.volume.levels[0].size;
+        let texels_per_unit =
+            (0..3).map(|i| f64::from(size[i]) * texture_from_view.row(i).length()).fold(0.0, f64::max);
+        let footprint = self.scene.medium.lod_footprint * self.projection.pixel * farthest;
+        Ok((cell, footprint * texels_per_unit > 1.0))
     }
 }

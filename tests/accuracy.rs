@@ -1,0 +1,100 @@
+//! The `shell` method against the reference on the three scenes of the demo, at the default quality and at finer steps.
+
+mod common;
+
+use std::path::Path;
+use std::sync::Arc;
+
+use common::Watched;
+use mesoshell::metric::{self, Metrics};
+use mesoshell::progress::Silent;
+use mesoshell::scene::{self, March, Scene};
+
+fn load(name: &str, overrides: &[&str]) -> Scene {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(name).with_extension("toml");
+    let overrides: Vec<String> = overrides.iter().map(|text| (*text).to_owned()).collect();
+    scene::load(&path, &overrides, &Silent).unwrap_or_else(|error| panic!("{error:?}")).scene
+}
+
+fn compare(scene: &Scene, steps: &[f64]) -> Vec<Metrics> {
+    let view = scene.view;
+    let reference = Watched::prepare("reference", &Arc::new(scene.clone())).render(&view).image;
+    let error = |step: &f64| {
+        let scene = Arc::new(Scene { march: March::Default { step: *step }, ..scene.clone() });
+        metric::compare(&Watched::prepare("shell", &scene).render(&view).image, &reference).unwrap()
+    };
+    steps.iter().map(error).collect()
+}
+
+/// At 512 x 512 and the default step.
+fn default_quality(name: &str) {
+    let scene = load(name, &[]);
+    assert_eq!((scene.view.width, scene.view.height), (512, 512));
+    let March::Default { step } = scene.march else { panic!("{name} has another plan") };
+    assert_eq!(scene.march, March::default(), "{name} sets its own quality");
+    let metrics = compare(&scene, &[step])[0];
+    println!("{name}: {metrics:?}");
+    assert_eq!(metrics.pixels, 512 * 512);
+    assert!(metrics.rmse <= 2e-3 && metrics.p999 <= 1e-2, "{name}: {metrics:?}");
+}
+
+/// Halving the step at least halves the error, until 2e-4.
+fn converges(name: &str) {
+    let scene = load(name, &["image.size=[192, 192]"]);
+    let steps = [2.0, 1.0, 0.5, 0.25, 0.125];
+    let errors: Vec<f64> = compare(&scene, &steps).iter().map(|metrics| metrics.rmse).collect();
+    println!("{name}: {errors:?}");
+    for pair in errors.windows(2) {
+        assert!(pair[1] <= 2e-4 || pair[1] <= 0.5 * pair[0], "{name}: {errors:?}");
+    }
+    assert!(errors[steps.len() - 1] <= 2e-4, "{name}: {errors:?}");
+}
+
+#[test]
+fn fur_sphere() {
+    default_quality("fur-sphere");
+    converges("fur-sphere");
+}
+
+#[test]
+fn fog_torus() {
+    default_quality("fog-torus");
+    converges("fog-torus");
+}
+
+#[test]
+fn weave_teapot() {
+    default_quality("weave-teapot");
+    converges("weave-teapot");
+}
+
+#[test]
+fn depth_is_that_of_the_reference() {
+    let mut scene = load("fur-sphere", &["image.size=[128, 128]", "march.step=0.125"]);
+    scene.view.depth = true;
+    let scene = Arc::new(scene);
+    let view = scene.view;
+    let depths =
+        ["shell", "reference"].map(|name| Watched::prepare(name, &scene).render(&view).depth.unwrap());
+    let mut compared = 0;
+    for (shell, reference) in depths[0].iter().zip(&depths[1]) {
+        // Where alpha is tiny the mean is a quotient of two tiny numbers; both are finite or neither.
+        if !shell.is_finite() || !reference.is_finite() {
+            continue;
+        }
+        compared += 1;
+        // The shell is 0.25 thick and a texel an eighth of a hundredth of that; silhouettes of the shell see little of it.
+        assert!((shell - reference).abs() < 0.02, "{shell} for {reference}");
+    }
+    assert!(compared > 5_000, "only {compared} pixels compared");
+}
+
+#[test]
+fn pictures_are_the_same_bytes_on_every_run() {
+    let scene = Arc::new(load("weave-teapot", &["image.size=[128, 128]"]));
+    let render = || Watched::prepare("shell", &scene).render(&scene.view).image;
+    let first = render();
+    let one_thread = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+    assert_eq!(first, render());
+    assert_eq!(first, one_thread.install(render));
+}

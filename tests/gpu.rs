@@ -1,0 +1,91 @@
+//! What the device layer refuses, and that it refuses before it asks the driver: nothing here may make the validation
+//! layers speak.
+
+use mesoshell::Error;
+use mesoshell::gpu::{
+    DeviceChoice, Gpu, Messages, Pipeline, PipelineInfo, Target, Texture3d, devices, shaders,
+};
+use mesoshell::volume::{Pyramid, Volume};
+
+fn watched(test: impl FnOnce(&std::sync::Arc<Gpu>)) {
+    let messages = Messages::default();
+    let gpu =
+        Gpu::open(&DeviceChoice::Any, Some(&messages)).unwrap_or_else(|error| panic!("{error}\n{error:?}"));
+    test(&gpu);
+    drop(gpu);
+    assert_eq!(messages.all(), Vec::<String>::new());
+}
+
+fn empty(size: [u32; 3]) -> Pyramid {
+    let texels = size.iter().map(|side| *side as usize).product();
+    Pyramid { levels: vec![Volume { size, texels: vec![[0.0; 4]; texels] }] }
+}
+
+#[test]
+fn a_device_is_chosen_by_index_name_and_uuid() {
+    let all = devices().expect("a Vulkan driver");
+    let first = &all[0];
+    for text in ["0", &first.name.to_uppercase()[..5], &first.uuid.to_uppercase()] {
+        let choice: DeviceChoice = text.parse().unwrap();
+        assert_eq!(Gpu::open(&choice, None).expect(text).info(), first, "{text}");
+    }
+    for text in ["99", "no such device", "00000000-dead-beef-0000-000000000000"] {
+        let choice: DeviceChoice = text.parse().unwrap();
+        let error = Gpu::open(&choice, None).expect_err(text);
+        assert_eq!(error.exit_code(), 4);
+        assert!(error.to_string().contains(text), "{error}");
+    }
+}
+
+#[test]
+fn a_volume_over_the_limit_is_refused() {
+    watched(|gpu| {
+        let limit = gpu.info().max_image_3d;
+        let error = Texture3d::upload(gpu, "the volume", &empty([limit + 1, 1, 1])).unwrap_err();
+        assert!(matches!(error, Error::Device { .. }), "{error:?}");
+        assert!(error.to_string().contains(&limit.to_string()), "{error}");
+        Texture3d::upload(gpu, "the volume", &empty([limit, 1, 1])).expect("the limit itself");
+    });
+}
+
+#[test]
+fn a_picture_over_the_limit_is_refused() {
+    watched(|gpu| {
+        let limit = gpu.info().max_image_2d;
+        let error = Target::new(gpu, limit + 1, 1, 1).unwrap_err();
+        assert!(matches!(error, Error::Device { .. }), "{error:?}");
+        Target::new(gpu, 64, 64, 2).expect("a small one");
+    });
+}
+
+#[test]
+fn a_picture_larger_than_memory_is_refused() {
+    watched(|gpu| {
+        let limit = gpu.info().max_image_2d;
+        let bytes = u64::from(limit) * u64::from(limit) * 32 * 64;
+        assert!(
+            bytes > gpu.info().memory_bytes,
+            "64 targets of the largest size fit: this machine is too large for the test"
+        );
+        let error = Target::new(gpu, limit, limit, 64).unwrap_err();
+        assert!(matches!(error, Error::OutOfMemory { .. }), "{error:?}");
+    });
+}
+
+#[test]
+fn what_the_layers_say_is_heard() {
+    // The layers are really there: push constants that the shader reads and the pipeline does not have.
+    let messages = Messages::default();
+    let gpu = Gpu::open(&DeviceChoice::Any, Some(&messages)).unwrap();
+    let target = Target::new(&gpu, 4, 4, 1).unwrap();
+    let info = PipelineInfo {
+        vertex: shaders::SHELL_VERT,
+        fragment: shaders::SHELL_FRAG,
+        constants: &[],
+        storage_buffers: 1,
+        textures: 1,
+        push_constant_bytes: 4,
+    };
+    let _ = Pipeline::new(&gpu, &target, &info);
+    assert!(!messages.all().is_empty());
+}
