@@ -5,7 +5,7 @@ use std::mem::offset_of;
 
 use mesoshell::gpu::shaders;
 use mesoshell::method::shell::ViewConstants;
-use mesoshell::method::shell::seen::Cell;
+use mesoshell::method::shell::seen::{Cell, Cycle};
 use rspirv::binary::parse_words;
 use rspirv::dr::{Instruction, Loader, Module, Operand};
 use rspirv::spirv::{Decoration, Op};
@@ -76,12 +76,18 @@ macro_rules! host {
 fn shell_structs_agree() {
     let constants = host!(ViewConstants: centre, pixel, near, texels, last_level, lod_scale, per_opacity_distance, step, samples);
     // The vertex shader reads no constants, but the fragment shaders do.
-    for words in [shaders::SHELL_FRAG, shaders::SHELL_DEPTH_FRAG] {
+    for words in
+        [shaders::SHELL_FRAG, shaders::SHELL_DEPTH_FRAG, shaders::CYCLE_FRAG, shaders::CYCLE_DEPTH_FRAG]
+    {
         assert_eq!(layout(words, "View").0, constants);
     }
     let (members, stride) = layout(shaders::SHELL_VERT, "Cell");
     assert_eq!(members, host!(Cell: outline, planes, texture));
     assert_eq!(stride, Some(size_of::<Cell>() as u32));
+    assert_eq!(layout(shaders::CYCLE_FRAG, "Cell"), (members, stride));
+    let (members, stride) = layout(shaders::CYCLE_VERT, "Cycle");
+    assert_eq!(members, host!(Cycle: bounds, members));
+    assert_eq!(stride, Some(size_of::<Cycle>() as u32));
 }
 
 #[test]

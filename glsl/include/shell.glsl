@@ -20,3 +20,9 @@ struct Cell {
     vec4 planes[4];      // inside: dot(plane.xyz, point) >= plane.w; the same numbers, negated, in the cell beyond the face
     vec4 texture[3];     // u, v, w of a point: dot(row.xyz, point) + row.w
 };
+
+// Tetrahedra that no order is right for.
+struct Cycle {
+    vec4 bounds;         // clip space: least x and y, greatest x and y, around all that they cover
+    uvec2 members;       // range of cells: first, end
+};

@@ -1,5 +1,6 @@
-//! Graphics pipelines that blend front to back, and the one draw call that uses them.
+//! Graphics pipelines that blend front to back, and the one call that draws with them.
 
+use std::ops::Range;
 use std::sync::{Arc, PoisonError};
 use std::time::Duration;
 
@@ -20,7 +21,7 @@ pub struct PipelineInfo<'a> {
     pub fragment: &'a [u32],
     /// Values of the specialisation constants 0, 1, ... of the fragment shader (booleans are 0 or 1).
     pub constants: &'a [u32],
-    /// Storage buffers at the bindings 0, 1, ... of set 0, read by the vertex shader.
+    /// Storage buffers at the bindings 0, 1, ... of set 0, read by either shader.
     pub storage_buffers: u32,
     /// Sampled textures at the bindings after the buffers, read by the fragment shader.
     pub textures: u32,
@@ -136,7 +137,8 @@ impl Pipeline {
         let mut bindings: Vec<vk::DescriptorSetLayoutBinding<'_>> = Vec::new();
         for binding in 0..self.buffers + self.textures {
             let (kind, stage) = if binding < self.buffers {
-                (vk::DescriptorType::STORAGE_BUFFER, vk::ShaderStageFlags::VERTEX)
+                let both = vk::ShaderStageFlags::VERTEX | vk::ShaderStageFlags::FRAGMENT;
+                (vk::DescriptorType::STORAGE_BUFFER, both)
             } else {
                 (vk::DescriptorType::COMBINED_IMAGE_SAMPLER, vk::ShaderStageFlags::FRAGMENT)
             };
@@ -247,21 +249,28 @@ impl Drop for ShaderModule<'_> {
     }
 }
 
-/// One draw into a cleared target.
+/// Draws into a cleared target, one after another: blending keeps their order.
 #[derive(Debug, Clone, Copy)]
 pub struct Draw<'a> {
     /// Where to.
     pub target: &'a Target,
-    /// How; built for a target with the same number of attachments.
-    pub pipeline: &'a Pipeline,
-    /// At the bindings 0, 1, ...
+    /// For every pipeline, at the bindings 0, 1, ...
     pub buffers: &'a [&'a Buffer],
-    /// At the bindings after those.
+    /// For every pipeline, at the bindings after those.
     pub textures: &'a [&'a Texture3d],
-    /// As many bytes as the pipeline was built with.
+    /// As many bytes as the pipelines were built with.
     pub push_constants: &'a [u8],
-    /// Three a triangle.
-    pub vertices: u32,
+    /// What is drawn, in order.
+    pub batches: &'a [Batch<'a>],
+}
+
+/// Some triangles through one pipeline, which was built for a target with the same number of attachments.
+#[derive(Debug, Clone)]
+pub struct Batch<'a> {
+    /// How.
+    pub pipeline: &'a Pipeline,
+    /// Three a triangle: the values of `gl_VertexIndex`.
+    pub vertices: Range<u32>,
 }
 
 /// Device time of a draw, by its own timestamps.
@@ -282,9 +291,15 @@ pub struct DrawTimes {
 /// # Panics
 /// Where bindings or push constants do not match the pipeline.
 pub fn draw(gpu: &Arc<Gpu>, draw: &Draw<'_>) -> Result<Option<DrawTimes>> {
-    let Draw { target, pipeline, .. } = draw;
-    assert_eq!(draw.push_constants.len(), pipeline.push_constant_bytes as usize);
-    pipeline.bind(draw.buffers, draw.textures);
+    let target = draw.target;
+    let mut bound: Vec<&Pipeline> = Vec::new();
+    for Batch { pipeline, .. } in draw.batches {
+        if !bound.iter().any(|one| std::ptr::eq(*one, *pipeline)) {
+            assert_eq!(draw.push_constants.len(), pipeline.push_constant_bytes as usize);
+            pipeline.bind(draw.buffers, draw.textures);
+            bound.push(pipeline);
+        }
+    }
     let timestamps = gpu.timestamp_period.map(|period| Timestamps::new(gpu, period)).transpose()?;
     let stamp = |commands, stage, index| {
         if let Some(timestamps) = &timestamps {
@@ -320,26 +335,17 @@ pub fn draw(gpu: &Arc<Gpu>, draw: &Draw<'_>) -> Result<Option<DrawTimes>> {
         // was built for this kind of target and its bindings were just written.
         unsafe {
             gpu.raw.cmd_begin_render_pass(commands, &begin, vk::SubpassContents::INLINE);
-            gpu.raw.cmd_bind_pipeline(commands, vk::PipelineBindPoint::GRAPHICS, pipeline.raw);
             gpu.raw.cmd_set_viewport(commands, 0, &[viewport]);
             gpu.raw.cmd_set_scissor(commands, 0, &[area]);
-            gpu.raw.cmd_bind_descriptor_sets(
-                commands,
-                vk::PipelineBindPoint::GRAPHICS,
-                pipeline.layout,
-                0,
-                &[pipeline.set],
-                &[],
-            );
-            gpu.raw.cmd_push_constants(
-                commands,
-                pipeline.layout,
-                vk::ShaderStageFlags::VERTEX | vk::ShaderStageFlags::FRAGMENT,
-                0,
-                draw.push_constants,
-            );
-            if draw.vertices > 0 {
-                gpu.raw.cmd_draw(commands, draw.vertices, 1, 0, 0);
+            for Batch { pipeline, vertices } in draw.batches {
+                let raw = &gpu.raw;
+                raw.cmd_bind_pipeline(commands, vk::PipelineBindPoint::GRAPHICS, pipeline.raw);
+                let sets = [pipeline.set];
+                let graphics = vk::PipelineBindPoint::GRAPHICS;
+                raw.cmd_bind_descriptor_sets(commands, graphics, pipeline.layout, 0, &sets, &[]);
+                let stages = vk::ShaderStageFlags::VERTEX | vk::ShaderStageFlags::FRAGMENT;
+                raw.cmd_push_constants(commands, pipeline.layout, stages, 0, draw.push_constants);
+                raw.cmd_draw(commands, vertices.len() as u32, 1, vertices.start, 0);
             }
             gpu.raw.cmd_end_render_pass(commands);
         }

@@ -15,6 +15,6 @@ pub mod texture;
 
 pub use buffer::Buffer;
 pub use device::{DeviceChoice, DeviceInfo, Gpu, Messages, devices};
-pub use draw::{Draw, DrawTimes, Pipeline, PipelineInfo, draw};
+pub use draw::{Batch, Draw, DrawTimes, Pipeline, PipelineInfo, draw};
 pub use target::Target;
 pub use texture::Texture3d;

@@ -3,7 +3,8 @@
 //! A frame runs top to bottom in `Shell::render`: order, see (what depends on the eye), upload, march, read
 //! back. Deviations from the paper, and why: entry and exit are computed exactly per pixel within conservative outlines
 //! ([`outline`], `glsl/shell.frag.glsl`), because interpolated ones inherit the rasteriser's snapping; an eye inside the
-//! shell is then no special case; and tetrahedra are drawn front to back into a floating-point target.
+//! shell is then no special case; tetrahedra are drawn front to back into a floating-point target; and those that hide one
+//! another in a cycle, or overlap, are resolved per pixel (`glsl/cycle.frag.glsl`).
 
 pub mod outline;
 pub mod seen;
@@ -12,11 +13,11 @@ use std::sync::Arc;
 
 use bytemuck::{Pod, Zeroable};
 
-use self::seen::{Cell, Seen};
+use self::seen::{Cell, Cycle, Run, Seen};
 use super::{Method, Setup};
 use crate::Result;
 use crate::frame::{Frame, Image, Report, Stopwatch};
-use crate::gpu::{Buffer, Draw, Gpu, Pipeline, PipelineInfo, Target, Texture3d, draw, shaders};
+use crate::gpu::{Batch, Buffer, Draw, Gpu, Pipeline, PipelineInfo, Target, Texture3d, draw, shaders};
 use crate::order::{Sorted, Sorter};
 use crate::progress::{Interrupt, Progress};
 use crate::scene::{March, Scene, View};
@@ -53,8 +54,23 @@ struct Shell {
 struct Canvas {
     kind: CanvasKind,
     target: Target,
-    pipeline: Pipeline,
+    sorted: Pipeline,
+    /// For cycles, where there are any.
+    cycle: Option<Pipeline>,
     cells: Buffer,
+    cycles: Buffer,
+}
+
+impl Canvas {
+    fn batch(&self, run: &Run) -> Batch<'_> {
+        match run {
+            Run::Sorted(cells) => Batch { pipeline: &self.sorted, vertices: 6 * cells.start..6 * cells.end },
+            Run::Cycle(index) => Batch {
+                pipeline: self.cycle.as_ref().expect("built where there are cycles"),
+                vertices: 6 * index..6 * (index + 1),
+            },
+        }
+    }
 }
 
 /// What a canvas depends on.
@@ -64,6 +80,7 @@ struct CanvasKind {
     height: u32,
     depth: bool,
     minified: bool,
+    cycles: bool,
 }
 
 /// Opens the device and uploads the scene.
@@ -104,8 +121,13 @@ impl Method for Shell {
         let seen = Seen::new(&self.scene, &sorted, view, self.gpu.subpixels());
         watch.lap("see");
         self.progress.stage("uploading the view");
-        let kind =
-            CanvasKind { width: view.width, height: view.height, depth: view.depth, minified: seen.minified };
+        let kind = CanvasKind {
+            width: view.width,
+            height: view.height,
+            depth: view.depth,
+            minified: seen.minified,
+            cycles: !seen.cycles.is_empty(),
+        };
         let kept = self.canvas.take();
         let canvas = self.canvas(kept, kind, &seen)?;
         let canvas = &*self.canvas.insert(canvas);
@@ -113,15 +135,15 @@ impl Method for Shell {
 
         self.interrupt.check()?;
         self.progress.stage("marching");
+        let batches: Vec<Batch<'_>> = seen.runs.iter().map(|run| canvas.batch(run)).collect();
         let times = draw(
             &self.gpu,
             &Draw {
                 target: &canvas.target,
-                pipeline: &canvas.pipeline,
-                buffers: &[&canvas.cells],
+                buffers: &[&canvas.cells, &canvas.cycles],
                 textures: &[&self.volume],
                 push_constants: bytemuck::bytes_of(&constants(&self.scene, view)),
-                vertices: u32::try_from(6 * seen.cells.len()).expect("the buffer's limit is far below"),
+                batches: &batches,
             },
         )?;
         watch.lap("march");
@@ -147,37 +169,45 @@ impl Method for Shell {
 impl Shell {
     /// The canvas for this frame, with what was seen in its buffers: the one of the frame before, where it fits.
     fn canvas(&self, kept: Option<Canvas>, kind: CanvasKind, seen: &Seen) -> Result<Canvas> {
-        let fits =
-            |canvas: &Canvas| canvas.kind == kind && canvas.cells.capacity::<Cell>() >= seen.cells.len();
+        let fits = |canvas: &Canvas| {
+            canvas.kind == kind
+                && canvas.cells.capacity::<Cell>() >= seen.cells.len()
+                && canvas.cycles.capacity::<Cycle>() >= seen.cycles.len()
+        };
         let Some(mut canvas) = kept.filter(fits) else {
             return self.new_canvas(kind, seen);
         };
         canvas.cells.write(&seen.cells);
+        canvas.cycles.write(&seen.cycles);
         Ok(canvas)
     }
 
     fn new_canvas(&self, kind: CanvasKind, seen: &Seen) -> Result<Canvas> {
         let target = Target::new(&self.gpu, kind.width, kind.height, if kind.depth { 2 } else { 1 })?;
-        let pipeline = Pipeline::new(
-            &self.gpu,
-            &target,
-            &PipelineInfo {
-                vertex: shaders::SHELL_VERT,
-                fragment: if kind.depth { shaders::SHELL_DEPTH_FRAG } else { shaders::SHELL_FRAG },
-                constants: &[
-                    u32::from(matches!(self.scene.march, March::Paper { .. })),
-                    u32::from(kind.minified),
-                ],
-                storage_buffers: 1,
+        let constants =
+            [u32::from(matches!(self.scene.march, March::Paper { .. })), u32::from(kind.minified)];
+        let pipeline = |vertex, fragment| {
+            let info = PipelineInfo {
+                vertex,
+                fragment,
+                constants: &constants,
+                storage_buffers: 2,
                 textures: 1,
-                push_constant_bytes: u32::try_from(size_of::<ViewConstants>()).expect("a few dozen bytes"),
-            },
-        )?;
+                push_constant_bytes: size_of::<ViewConstants>() as u32,
+            };
+            Pipeline::new(&self.gpu, &target, &info)
+        };
+        let [sorted, cycle] = match kind.depth {
+            true => [shaders::SHELL_DEPTH_FRAG, shaders::CYCLE_DEPTH_FRAG],
+            false => [shaders::SHELL_FRAG, shaders::CYCLE_FRAG],
+        };
         Ok(Canvas {
             kind,
-            target,
-            pipeline,
+            sorted: pipeline(shaders::SHELL_VERT, sorted)?,
+            cycle: kind.cycles.then(|| pipeline(shaders::CYCLE_VERT, cycle)).transpose()?,
             cells: Buffer::storage(&self.gpu, "the tetrahedra in order", &seen.cells)?,
+            cycles: Buffer::storage(&self.gpu, "the cycles", &seen.cycles)?,
+            target,
         })
     }
 
@@ -191,6 +221,7 @@ impl Shell {
         count("face_relations", sorted.face_relations);
         count("image_relations", sorted.image_relations);
         count("cycles", sorted.order.cycles.len() as u64);
+        count("tetrahedra_in_cycles", sorted.cycle_members);
         count("pixels_covered", rgba.iter().filter(|pixel| pixel[3] > 0.0).count() as u64);
         if seen.before_near > 0 {
             report.skipped.push(format!("{} tetrahedra lie before the near plane", seen.before_near));
@@ -201,15 +232,13 @@ impl Shell {
         if health.zero_volume > 0 {
             report.skipped.push(format!("{} tetrahedra have no volume", health.zero_volume));
         }
+        if sorted.order.cycles.is_empty() {
+            report
+                .skipped
+                .push("no tetrahedra hide one another in a cycle: nothing is resolved per pixel".into());
+        }
         if !seen.minified {
             report.skipped.push("all is magnified: no level of detail but 0 is compiled in".into());
-        }
-        if !sorted.order.cycles.is_empty() {
-            report.warnings.push(format!(
-                "{} tetrahedra hide one another in {} cycles: where they overlap, the picture is approximate",
-                sorted.cycle_members,
-                sorted.order.cycles.len()
-            ));
         }
         if health.inverted > 0 {
             report.warnings.push(format!(

@@ -1,6 +1,8 @@
 //! A shell as seen from one eye: what the shaders need of each tetrahedron, front to back. Positions are taken relative to the
 //! eye in f64 before anything is f32, so that a scene far from the origin loses nothing.
 
+use std::ops::Range;
+
 use bytemuck::{Pod, Zeroable};
 use glam::{DMat3, DVec2, DVec3};
 use rayon::prelude::*;
@@ -19,11 +21,37 @@ pub struct Cell {
     pub texture: [[f32; 4]; 3],
 }
 
+/// `Cycle` of `glsl/include/shell.glsl`: see there for each member.
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+#[repr(C)]
+#[allow(missing_docs, reason = "documented at the one declaration in glsl")]
+pub struct Cycle {
+    pub bounds: [f32; 4],
+    pub members: [u32; 2],
+    pub padding: [u32; 2],
+}
+
+/// A cell, and whether more than level 0 can be needed in it; `None` where there is no volume.
+type Found = Option<Result<(Cell, bool), Unseen>>;
+
+/// What is drawn together.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Run {
+    /// These cells, one after another.
+    Sorted(Range<u32>),
+    /// The cells of this cycle, resolved per pixel.
+    Cycle(u32),
+}
+
 /// All that can be seen, and what cannot.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct Seen {
     /// Front to back.
     pub cells: Vec<Cell>,
+    /// Cells that have no order of their own.
+    pub cycles: Vec<Cycle>,
+    /// Front to back, every cell once.
+    pub runs: Vec<Run>,
     /// Tetrahedra before the near plane.
     pub before_near: u64,
     /// Tetrahedra beside the picture.
@@ -37,23 +65,71 @@ impl Seen {
     /// a pixel.
     pub fn new(scene: &Scene, sorted: &Sorted, view: &View, subpixels: u32) -> Self {
         let eye = Eye::new(scene, view, subpixels);
-        let drawn: Vec<u32> =
-            sorted.order.sequence.iter().copied().filter(|&t| sorted.exit_faces[t as usize] != 0).collect();
-        let found: Vec<Result<(Cell, bool), Unseen>> =
-            drawn.par_iter().map(|&t| eye.cell(t as usize, sorted.exit_faces[t as usize])).collect();
-        let mut seen =
-            Self { cells: Vec::with_capacity(found.len()), before_near: 0, beside: 0, minified: false };
-        for cell in found {
+        let order = &sorted.order;
+        let found: Vec<Found> = order
+            .sequence
+            .par_iter()
+            .map(|&t| {
+                let exit_faces = sorted.exit_faces[t as usize];
+                (exit_faces != 0).then(|| eye.cell(t as usize, exit_faces))
+            })
+            .collect();
+        let mut seen = Self { cells: Vec::with_capacity(found.len()), ..Self::default() };
+        let mut done = 0;
+        for cycle in &order.cycles {
+            seen.add_sorted(&found[done..cycle.start]);
+            seen.add_cycle(&found[cycle.clone()]);
+            done = cycle.end;
+        }
+        seen.add_sorted(&found[done..]);
+        seen
+    }
+
+    fn add_sorted(&mut self, found: &[Found]) {
+        let added = self.add(found);
+        if !added.is_empty() {
+            self.runs.push(Run::Sorted(added));
+        }
+    }
+
+    fn add_cycle(&mut self, found: &[Found]) {
+        let added = self.add(found);
+        let members = &self.cells[added.start as usize..added.end as usize];
+        if members.len() < 2 {
+            // All others lie before the near plane or beside the picture.
+            if !added.is_empty() {
+                self.runs.push(Run::Sorted(added));
+            }
+            return;
+        }
+        let corners =
+            || members.iter().flat_map(|cell| cell.outline).flat_map(|[x, y, z, w]| [[x, y], [z, w]]);
+        let least =
+            corners().fold([f32::INFINITY; 2], |m, corner| [m[0].min(corner[0]), m[1].min(corner[1])]);
+        let most =
+            corners().fold([f32::NEG_INFINITY; 2], |m, corner| [m[0].max(corner[0]), m[1].max(corner[1])]);
+        self.runs.push(Run::Cycle(self.cycles.len() as u32));
+        self.cycles.push(Cycle {
+            bounds: [least[0], least[1], most[0], most[1]],
+            members: [added.start, added.end],
+            padding: [0; 2],
+        });
+    }
+
+    /// Keeps those that can be seen, counts the others.
+    fn add(&mut self, found: &[Found]) -> Range<u32> {
+        let first = self.cells.len() as u32;
+        for cell in found.iter().flatten() {
             match cell {
                 Ok((cell, minified)) => {
-                    seen.minified |= minified;
-                    seen.cells.push(cell);
+                    self.minified |= minified;
+                    self.cells.push(*cell);
                 }
-                Err(Unseen::BeforeNear) => seen.before_near += 1,
-                Err(Unseen::Beside) => seen.beside += 1,
+                Err(Unseen::BeforeNear) => self.before_near += 1,
+                Err(Unseen::Beside) => self.beside += 1,
             }
         }
-        seen
+        first..self.cells.len() as u32
     }
 }
 

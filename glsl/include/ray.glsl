@@ -1,0 +1,21 @@
+// The ray of a fragment and its interval in a tetrahedron. Both are exact per pixel: the rasteriser only says where to look.
+
+// In view space, at depth 1; image rows run down.
+vec3 pixel_ray() {
+    return vec3((gl_FragCoord.xy - view.centre) * vec2(view.pixel, -view.pixel), 1.0);
+}
+
+// Depths of entry and exit (Cyrus-Beck clipping), entry no nearer than the near plane; entry < exit where the ray meets the
+// tetrahedron. Cells that share a face hold the same plane, negated: one ends bit for bit where the other begins.
+vec2 interval(vec4 planes[4], vec3 ray) {
+    float entry = view.near;
+    float exit = 3.0e38;
+    for (int i = 0; i < 4; i++) {
+        float towards_inside = dot(planes[i].xyz, ray);
+        float depth = planes[i].w / towards_inside;
+        if (towards_inside > 0.0) entry = max(entry, depth);
+        else if (towards_inside < 0.0) exit = min(exit, depth);
+        else if (planes[i].w > 0.0) exit = entry; // parallel to the face, and outside
+    }
+    return vec2(entry, exit);
+}

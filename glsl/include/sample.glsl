@@ -1,0 +1,43 @@
+// Reads the volume along a ray in one tetrahedron, at the level of detail of the pixel's footprint.
+
+layout(constant_id = 0) const bool PAPER_PLAN = false;
+layout(constant_id = 1) const bool MINIFIED = true; // whether any level but 0 can be needed
+
+layout(set = 0, binding = 2) uniform sampler3D volume; // premultiplied
+
+// The texture along a ray: affine in depth.
+struct Path {
+    vec3 at_eye;      // texture coordinates at depth 0
+    vec3 from_depth;  // and their change per unit of depth
+    float detail;     // footprint of the pixel at depth 1, in level-0 texels
+};
+
+Path path_in(vec4 rows[3], vec3 ray) {
+    // Across the ray alone: the pixel has no width along it.
+    vec3 across = view.texels
+        * vec3(length(cross(rows[0].xyz, ray)), length(cross(rows[1].xyz, ray)), length(cross(rows[2].xyz, ray)));
+    return Path(vec3(rows[0].w, rows[1].w, rows[2].w),
+                vec3(dot(rows[0].xyz, ray), dot(rows[1].xyz, ray), dot(rows[2].xyz, ray)),
+                view.lod_scale * max(across.x, max(across.y, across.z)) / length(ray));
+}
+
+float level_of_detail(Path path, float depth) {
+    return clamp(log2(depth * path.detail), 0.0, view.last_level);
+}
+
+// Blends two levels by hand: hardware may round the blend's weight to 8 bits.
+vec4 fetch(Path path, float depth) {
+    vec3 point = path.at_eye + depth * path.from_depth;
+    if (!MINIFIED) return textureLod(volume, point, 0.0);
+    float level = level_of_detail(path, depth);
+    float fine = floor(level);
+    return mix(textureLod(volume, point, fine), textureLod(volume, point, min(fine + 1.0, view.last_level)), level - fine);
+}
+
+// How many samples the plan gives to a segment.
+uint sample_count(Path path, float entry, float exit) {
+    if (PAPER_PLAN) return view.samples;
+    float texel = MINIFIED ? exp2(floor(level_of_detail(path, 0.5 * (entry + exit)))) : 1.0;
+    float texels = length(path.from_depth * view.texels) * (exit - entry) / texel;
+    return uint(clamp(ceil(texels / view.step), 1.0, 65536.0));
+}
