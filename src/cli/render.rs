@@ -76,8 +76,9 @@ pub fn run(arguments: Arguments, talk: Talk) -> Result<()> {
 fn render(arguments: &Arguments, progress: &Arc<dyn Progress>, interrupt: &Interrupt) -> Result<Rendered> {
     let scene = &arguments.scene;
     let output = arguments.output.clone().unwrap_or_else(|| {
-        let stem = scene.file_stem().unwrap_or("scene".as_ref());
-        PathBuf::from(stem).with_added_extension("png")
+        let mut name = scene.file_stem().unwrap_or("scene".as_ref()).to_owned();
+        name.push(".png");
+        name.into()
     });
     file::check_writable(&output)?;
 

@@ -12,7 +12,7 @@ use toml::Spanned;
 
 use super::camera::DEFAULT_FOV_DEGREES;
 use super::number::{
-    Exactly, FieldOfView, Finite, Fraction, NotNegative, PictureSize, Pixels, Positive, Rounds, Samples,
+    Exactly, FieldOfView, Finite, Fraction, NotNegative, PictureSize, Pixels, Positive, Rounds, Samples, Step,
 };
 use crate::mesh::generate::Generator;
 use crate::mesh::projection::Projection;
@@ -120,7 +120,7 @@ pub struct MarchSection {
     /// Which of the two keys below counts.
     pub plan: Plan,
     /// In texels: see [`March::Default`](super::March::Default).
-    pub step: Positive,
+    pub step: Step,
     /// In each tetrahedron: see [`March::Paper`](super::March::Paper).
     pub samples: Samples,
 }
@@ -143,7 +143,7 @@ impl Default for ImageSection {
 
 impl Default for MarchSection {
     fn default() -> Self {
-        Self { plan: Plan::Default, step: Positive(0.5), samples: Samples(10) }
+        Self { plan: Plan::Default, step: Step(0.5), samples: Samples(10) }
     }
 }
 

@@ -188,7 +188,7 @@ fn camera(text: &Text, section: &CameraSection) -> Result<Camera> {
     let vector = |v: &Exactly<3, Finite>| DVec3::from_array(v.0.map(|x| x.0));
     let (eye, target) = (vector(&section.eye), vector(section.target.get_ref()));
     let distance = eye.distance(target);
-    if !(distance.is_normal() && eye + (target - eye) / distance != eye) {
+    if !distance.is_normal() {
         return Err(text.error(section.target.span(), "the target must be a point other than the eye"));
     }
     let up = section.up.as_ref().map_or(DVec3::Y, |up| vector(up.get_ref()));
@@ -293,7 +293,7 @@ recipe = "fog.toml"
         ["[mesh]", "[image]\nbackground = [0, -1, 0]\n[mesh]", "-1", "at least 0"],
         ["[mesh]", "[march]\nplan = 'papr'\n[mesh]", "'papr'", "`default` or `paper`"],
         ["[mesh]", "[march]\nsamples = 0\n[mesh]", "0", "from 1 to 4096"],
-        ["[mesh]", "[march]\nstep = 0\n[mesh]", "0", "greater than 0"],
+        ["[mesh]", "[march]\nstep = 0\n[mesh]", "0", "from 0.001"],
         ["[mesh]", "[camera]\neye = [0, 0, 1]\n[mesh]", "[camera]", "missing key `target`"],
         [
             "[mesh]",

@@ -8,7 +8,7 @@
 //! use mesoshell::volume::{Pyramid, Volume};
 //!
 //! let mesh = Generator::Torus(Torus::default()).build()?;
-//! let shell = Shell::build(&mesh, &ShellOptions { thickness: 0.2, ..Default::default() })?;
+//! let shell = Shell::build(&mesh, &ShellOptions::new(0.2))?;
 //! let half_opaque_orange = Volume::new([1, 1, 1], vec![[0.5, 0.2, 0.0, 0.5]])?;
 //! let mut scene = Scene::new(shell, Pyramid::build(half_opaque_orange), 0.2);
 //! (scene.view.width, scene.view.height) = (64, 64);

@@ -64,17 +64,22 @@ macro_rules! count {
     };
 }
 
+// What is far from the limits of f32 and f64 can be squared and divided.
 number! {
-    /// Any finite number.
-    Finite = "a finite number", |_| true
+    /// A coordinate.
+    Finite = "a finite number from -1e30 to 1e30", |value| value.abs() <= 1e30
 }
 number! {
-    /// Finite, above 0.
-    Positive = "a finite number greater than 0", |value| value > 0.0
+    /// A length.
+    Positive = "a finite number greater than 0, from 1e-30 to 1e30", |value| (1e-30..=1e30).contains(&value)
 }
 number! {
-    /// Finite, 0 or above.
-    NotNegative = "a finite number of at least 0", |value| value >= 0.0
+    /// A colour or a factor.
+    NotNegative = "a finite number of at least 0, at most 1e30", |value| (0.0..=1e30).contains(&value)
+}
+number! {
+    /// A part of a texel: a step without bound would keep a device busy for ever.
+    Step = "a number from 0.001 to 1000", |value| (0.001..=1000.0).contains(&value)
 }
 number! {
     /// From 0 to 1, both included.
