@@ -11,84 +11,106 @@
 #include "sample.glsl"
 
 layout(set = 0, binding = 0, std430) readonly buffer Cells { Cell cells[]; };
+layout(set = 0, binding = 2, std430) readonly buffer Members { uint list[]; };
 
-layout(location = 0) flat in uvec2 members; // first, end
+layout(location = 0) flat in uvec2 members; // range of the list of cells: first, end
 
 layout(location = 0) out vec4 out_rgba; // premultiplied
 #ifdef DEPTH
 layout(location = 1) out vec4 out_depth; // (distance * alpha, 0, 0, alpha)
 #endif
 
-// Those that the ray meets; where there are more, every member is looked at each time.
+// The nearest of the members that the ray meets, by entry, and where it meets them.
 const uint MOST_HITS = 64;
 uint hits[MOST_HITS];
+vec2 spans[MOST_HITS];
+
+// Fills `hits` and `spans` with members that end beyond depth `done`; returns their number, and in `horizon` the depth up to
+// which no other member reaches.
+uint gather(vec3 ray, float done, out float horizon) {
+    uint count = 0;
+    horizon = 3.0e38;
+    for (uint member = members.x; member < members.y; member++) {
+        uint cell = list[member];
+        vec2 span = interval(cells[cell].planes, ray);
+        if (!(span.y > span.x) || span.y <= done) continue;
+        if (count == MOST_HITS) {
+            // The farthest gives way, or this one is it.
+            horizon = min(horizon, max(span.x, spans[MOST_HITS - 1].x));
+            if (span.x >= spans[MOST_HITS - 1].x) continue;
+            count--;
+        }
+        uint place = count++;
+        for (; place > 0 && spans[place - 1].x > span.x; place--) {
+            spans[place] = spans[place - 1];
+            hits[place] = hits[place - 1];
+        }
+        spans[place] = span;
+        hits[place] = cell;
+    }
+    return count;
+}
 
 void main() {
     vec3 ray = pixel_ray();
-    uint hit_count = 0;
-    float z = 3.0e38;
-    for (uint cell = members.x; cell < members.y; cell++) {
-        vec2 segment = interval(cells[cell].planes, ray);
-        if (!(segment.y > segment.x)) continue;
-        if (hit_count < MOST_HITS) hits[hit_count] = cell;
-        hit_count++;
-        z = min(z, segment.x);
-    }
-    if (hit_count == 0) discard;
-    bool listed = hit_count <= MOST_HITS;
-    uint looks = listed ? hit_count : members.y - members.x;
-
     float per_depth = length(ray) * view.per_opacity_distance;
     vec4 rgba = vec4(0.0);
     float transmittance = 1.0;
     float mean_distance = 0.0;
-    while (z < 3.0e38) {
-        // The next entry or exit, and how finely the finest active member wants to be sampled until then.
-        float next = 3.0e38;
-        for (uint look = 0; look < looks; look++) {
-            vec2 segment = interval(cells[listed ? hits[look] : members.x + look].planes, ray);
-            if (!(segment.y > segment.x)) continue;
-            if (segment.x > z) next = min(next, segment.x);
-            if (segment.y > z) next = min(next, segment.y);
-        }
-        if (next == 3.0e38) break;
-        uint count = 0;
-        for (uint look = 0; look < looks; look++) {
-            uint cell = listed ? hits[look] : members.x + look;
-            vec2 segment = interval(cells[cell].planes, ray);
-            if (segment.x <= z && segment.y > z) count = max(count, sample_count(path_in(cells[cell].texture, ray), z, next));
-        }
-        float step = (next - z) / float(count); // count is 0 in a gap: no sample
-        for (uint i = 0; i < count; i++) {
-            float at = z + (float(i) + 0.5) * step;
-            float depth = 0.0;
-            vec3 emitted = vec3(0.0); // sum of straight colour times optical depth
-            uint walls = 0;
-            vec3 wall = vec3(0.0);
-            for (uint look = 0; look < looks; look++) {
-                uint cell = listed ? hits[look] : members.x + look;
-                vec2 segment = interval(cells[cell].planes, ray);
-                if (!(segment.x <= z && segment.y > z)) continue;
-                vec4 texel = fetch(path_in(cells[cell].texture, ray), at);
-                if (texel.a >= 1.0) {
-                    walls++;
-                    wall += texel.rgb;
-                } else if (texel.a > 0.0) {
-                    float one = optical_depth(texel.a) * step * per_depth;
-                    depth += one;
-                    emitted += texel.rgb * (one / texel.a);
-                }
+    float z = 0.0;
+    float before;
+    float horizon;
+    do {
+        before = z;
+        uint count = gather(ray, z, horizon);
+        if (count == 0) break;
+        z = max(z, spans[0].x);
+        uint first = 0;
+        while (z < horizon) {
+            while (first < count && spans[first].y <= z) first++;
+            if (first == count) break;
+            // The next entry or exit, and how finely the finest active member wants to be sampled until then.
+            float next = horizon;
+            uint end = first;
+            for (; end < count && spans[end].x <= z; end++) {
+                if (spans[end].y > z) next = min(next, spans[end].y);
             }
-            float alpha = walls > 0 ? 1.0 : opacity(depth);
-            vec3 colour = walls > 0 ? wall / float(walls) : depth > 0.0 ? emitted * (alpha / depth) : vec3(0.0);
-            rgba += transmittance * vec4(colour, alpha);
+            if (end < count) next = min(next, spans[end].x);
+            uint samples = 0;
+            for (uint hit = first; hit < end; hit++) {
+                if (spans[hit].y > z) samples = max(samples, sample_count(path_in(cells[hits[hit]].texture, ray), z, next));
+            }
+            float step = (next - z) / float(samples); // in a gap there are no samples
+            for (uint i = 0; i < samples; i++) {
+                float at = z + (float(i) + 0.5) * step;
+                float depth = 0.0;
+                vec3 emitted = vec3(0.0); // sum of straight colour times optical depth
+                uint walls = 0;
+                vec3 wall = vec3(0.0);
+                for (uint hit = first; hit < end; hit++) {
+                    if (spans[hit].y <= z) continue;
+                    vec4 texel = fetch(path_in(cells[hits[hit]].texture, ray), at);
+                    if (texel.a >= 1.0) {
+                        walls++;
+                        wall += texel.rgb;
+                    } else if (texel.a > 0.0) {
+                        float one = optical_depth(texel.a) * step * per_depth;
+                        depth += one;
+                        emitted += texel.rgb * (one / texel.a);
+                    }
+                }
+                float alpha = walls > 0 ? 1.0 : opacity(depth);
+                vec3 colour = walls > 0 ? wall / float(walls) : depth > 0.0 ? emitted * (alpha / depth) : vec3(0.0);
+                rgba += transmittance * vec4(colour, alpha);
 #ifdef DEPTH
-            mean_distance += transmittance * alpha * at * length(ray);
+                mean_distance += transmittance * alpha * at * length(ray);
 #endif
-            transmittance *= walls > 0 ? 0.0 : exp(-depth);
+                transmittance *= walls > 0 ? 0.0 : exp(-depth);
+            }
+            z = next;
         }
-        z = next;
-    }
+        // Where more than MOST_HITS members overlap in one point there is no getting on; the rest of the ray is left out.
+    } while (horizon < 3.0e38 && z > before);
     out_rgba = rgba;
 #ifdef DEPTH
     out_depth = vec4(mean_distance, 0.0, 0.0, rgba.a);

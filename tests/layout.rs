@@ -5,7 +5,7 @@ use std::mem::offset_of;
 
 use mesoshell::gpu::shaders;
 use mesoshell::method::shell::ViewConstants;
-use mesoshell::method::shell::seen::{Cell, Cycle};
+use mesoshell::method::shell::seen::{Cell, Tile};
 use rspirv::binary::parse_words;
 use rspirv::dr::{Instruction, Loader, Module, Operand};
 use rspirv::spirv::{Decoration, Op};
@@ -85,9 +85,9 @@ fn shell_structs_agree() {
     assert_eq!(members, host!(Cell: outline, planes, texture));
     assert_eq!(stride, Some(size_of::<Cell>() as u32));
     assert_eq!(layout(shaders::CYCLE_FRAG, "Cell"), (members, stride));
-    let (members, stride) = layout(shaders::CYCLE_VERT, "Cycle");
-    assert_eq!(members, host!(Cycle: bounds, members));
-    assert_eq!(stride, Some(size_of::<Cycle>() as u32));
+    let (members, stride) = layout(shaders::CYCLE_VERT, "Tile");
+    assert_eq!(members, host!(Tile: bounds, members));
+    assert_eq!(stride, Some(size_of::<Tile>() as u32));
 }
 
 #[test]

@@ -1,8 +1,11 @@
 //! Visibility orders, checked along every pixel's ray of many views.
 
+mod common;
+
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
+use common::{interlocking_bar, loose};
 use glam::DVec3;
 use mesoshell::mesh::Mesh;
 use mesoshell::mesh::generate::{Generator, Plane, Sphere, Torus, Tube, Vase};
@@ -239,40 +242,13 @@ fn one_swapped_pair_is_found() {
     assert_eq!((found.violations, found.cyclic), (0, found.pairs));
 }
 
-/// A shell of tetrahedra that share no vertex.
-fn loose(corners: &[[DVec3; 4]]) -> Shell {
-    let count = corners.len();
-    let topology = Topology {
-        tetrahedra: (0..count as u32).map(|t| [4 * t, 4 * t + 1, 4 * t + 2, 4 * t + 3]).collect(),
-        neighbours: vec![[mesoshell::shell::EXTERIOR; 4]; count],
-        ..Topology::default()
-    };
-    Shell {
-        topology: Arc::new(topology),
-        vertices: corners.as_flattened().to_vec(),
-        texture: vec![[DVec3::ZERO; 4]; count],
-        cells: vec![Default::default(); count],
-        health: Default::default(),
-    }
-}
-
-/// A bar whose high end lies over the low end of the next, a third of a turn further.
-fn interlocking_bar(turn: f64, height: f64) -> [DVec3; 4] {
-    let (sin, cos) = turn.sin_cos();
-    let along = DVec3::new(-sin, cos, 0.0);
-    let across = 0.05 * DVec3::new(cos, sin, 0.0);
-    let middle = DVec3::new(0.3 * cos, 0.3 * sin, height);
-    let (low, high) = (middle - along - 0.4 * DVec3::Z, middle + along + 0.4 * DVec3::Z);
-    [low - across, low + across, high - 0.05 * DVec3::Z, high + 0.05 * DVec3::Z]
-}
-
 #[test]
 fn three_interlocking_tetrahedra_are_a_cycle() {
     let third = TAU / 3.0;
     let mut bars = vec![interlocking_bar(0.0, 2.0)];
     bars.extend((0..3).map(|i| interlocking_bar(f64::from(i) * third, 0.0)));
     bars.push(interlocking_bar(0.1, -2.0));
-    let shell = loose(&bars);
+    let shell = loose(&bars, &[DVec3::ZERO; 5]);
     let camera =
         Camera { eye: DVec3::new(0.0, 0.0, 8.0), target: DVec3::ZERO, up: DVec3::Y, fov_y: 0.4, near: 0.01 };
     let view = View { camera, width: 96, height: 96, depth: false };

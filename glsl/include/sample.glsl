@@ -3,7 +3,7 @@
 layout(constant_id = 0) const bool PAPER_PLAN = false;
 layout(constant_id = 1) const bool MINIFIED = true; // whether any level but 0 can be needed
 
-layout(set = 0, binding = 2) uniform sampler3D volume; // premultiplied
+layout(set = 0, binding = 3) uniform sampler3D volume; // premultiplied
 
 // The texture along a ray: affine in depth.
 struct Path {

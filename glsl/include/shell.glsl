@@ -21,8 +21,8 @@ struct Cell {
     vec4 texture[3];     // u, v, w of a point: dot(row.xyz, point) + row.w
 };
 
-// Tetrahedra that no order is right for.
-struct Cycle {
-    vec4 bounds;         // clip space: least x and y, greatest x and y, around all that they cover
-    uvec2 members;       // range of cells: first, end
+// A square of pixels in which tetrahedra meet that no order is right for.
+struct Tile {
+    vec4 bounds;         // clip space: left, top, right, bottom
+    uvec2 members;       // range of the list of cells: first, end
 };

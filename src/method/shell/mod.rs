@@ -13,7 +13,7 @@ use std::sync::Arc;
 
 use bytemuck::{Pod, Zeroable};
 
-use self::seen::{Cell, Cycle, Run, Seen};
+use self::seen::{Cell, Run, Seen, Tile};
 use super::{Method, Setup};
 use crate::Result;
 use crate::frame::{Frame, Image, Report, Stopwatch};
@@ -58,18 +58,17 @@ struct Canvas {
     /// For cycles, where there are any.
     cycle: Option<Pipeline>,
     cells: Buffer,
-    cycles: Buffer,
+    tiles: Buffer,
+    members: Buffer,
 }
 
 impl Canvas {
     fn batch(&self, run: &Run) -> Batch<'_> {
-        match run {
-            Run::Sorted(cells) => Batch { pipeline: &self.sorted, vertices: 6 * cells.start..6 * cells.end },
-            Run::Cycle(index) => Batch {
-                pipeline: self.cycle.as_ref().expect("built where there are cycles"),
-                vertices: 6 * index..6 * (index + 1),
-            },
-        }
+        let (pipeline, quads) = match run {
+            Run::Sorted(cells) => (&self.sorted, cells),
+            Run::Cycle(tiles) => (self.cycle.as_ref().expect("built where there are cycles"), tiles),
+        };
+        Batch { pipeline, vertices: 6 * quads.start..6 * quads.end }
     }
 }
 
@@ -126,7 +125,7 @@ impl Method for Shell {
             height: view.height,
             depth: view.depth,
             minified: seen.minified,
-            cycles: !seen.cycles.is_empty(),
+            cycles: !seen.tiles.is_empty(),
         };
         let kept = self.canvas.take();
         let canvas = self.canvas(kept, kind, &seen)?;
@@ -140,7 +139,7 @@ impl Method for Shell {
             &self.gpu,
             &Draw {
                 target: &canvas.target,
-                buffers: &[&canvas.cells, &canvas.cycles],
+                buffers: &[&canvas.cells, &canvas.tiles, &canvas.members],
                 textures: &[&self.volume],
                 push_constants: bytemuck::bytes_of(&constants(&self.scene, view)),
                 batches: &batches,
@@ -172,13 +171,15 @@ impl Shell {
         let fits = |canvas: &Canvas| {
             canvas.kind == kind
                 && canvas.cells.capacity::<Cell>() >= seen.cells.len()
-                && canvas.cycles.capacity::<Cycle>() >= seen.cycles.len()
+                && canvas.tiles.capacity::<Tile>() >= seen.tiles.len()
+                && canvas.members.capacity::<u32>() >= seen.members.len()
         };
         let Some(mut canvas) = kept.filter(fits) else {
             return self.new_canvas(kind, seen);
         };
         canvas.cells.write(&seen.cells);
-        canvas.cycles.write(&seen.cycles);
+        canvas.tiles.write(&seen.tiles);
+        canvas.members.write(&seen.members);
         Ok(canvas)
     }
 
@@ -191,7 +192,7 @@ impl Shell {
                 vertex,
                 fragment,
                 constants: &constants,
-                storage_buffers: 2,
+                storage_buffers: 3,
                 textures: 1,
                 push_constant_bytes: size_of::<ViewConstants>() as u32,
             };
@@ -206,7 +207,8 @@ impl Shell {
             sorted: pipeline(shaders::SHELL_VERT, sorted)?,
             cycle: kind.cycles.then(|| pipeline(shaders::CYCLE_VERT, cycle)).transpose()?,
             cells: Buffer::storage(&self.gpu, "the tetrahedra in order", &seen.cells)?,
-            cycles: Buffer::storage(&self.gpu, "the cycles", &seen.cycles)?,
+            tiles: Buffer::storage(&self.gpu, "the tiles of cycles", &seen.tiles)?,
+            members: Buffer::storage(&self.gpu, "the members of cycles", &seen.members)?,
             target,
         })
     }

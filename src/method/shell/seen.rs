@@ -21,15 +21,18 @@ pub struct Cell {
     pub texture: [[f32; 4]; 3],
 }
 
-/// `Cycle` of `glsl/include/shell.glsl`: see there for each member.
+/// `Tile` of `glsl/include/shell.glsl`: see there for each member.
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
 #[allow(missing_docs, reason = "documented at the one declaration in glsl")]
-pub struct Cycle {
+pub struct Tile {
     pub bounds: [f32; 4],
     pub members: [u32; 2],
     pub padding: [u32; 2],
 }
+
+/// The side of a [`Tile`] in pixels: small enough that few members of a large cycle reach into one.
+const TILE: u32 = 16;
 
 /// A cell, and whether more than level 0 can be needed in it; `None` where there is no volume.
 type Found = Option<Result<(Cell, bool), Unseen>>;
@@ -39,8 +42,8 @@ type Found = Option<Result<(Cell, bool), Unseen>>;
 pub enum Run {
     /// These cells, one after another.
     Sorted(Range<u32>),
-    /// The cells of this cycle, resolved per pixel.
-    Cycle(u32),
+    /// These tiles, each resolved per pixel among its members.
+    Cycle(Range<u32>),
 }
 
 /// All that can be seen, and what cannot.
@@ -48,9 +51,11 @@ pub enum Run {
 pub struct Seen {
     /// Front to back.
     pub cells: Vec<Cell>,
-    /// Cells that have no order of their own.
-    pub cycles: Vec<Cycle>,
-    /// Front to back, every cell once.
+    /// Where cells meet that have no order of their own.
+    pub tiles: Vec<Tile>,
+    /// Cells, by tile.
+    pub members: Vec<u32>,
+    /// Front to back; every cell is in one.
     pub runs: Vec<Run>,
     /// Tetrahedra before the near plane.
     pub before_near: u64,
@@ -78,7 +83,7 @@ impl Seen {
         let mut done = 0;
         for cycle in &order.cycles {
             seen.add_sorted(&found[done..cycle.start]);
-            seen.add_cycle(&found[cycle.clone()]);
+            seen.add_cycle(&found[cycle.clone()], view);
             done = cycle.end;
         }
         seen.add_sorted(&found[done..]);
@@ -92,28 +97,38 @@ impl Seen {
         }
     }
 
-    fn add_cycle(&mut self, found: &[Found]) {
+    fn add_cycle(&mut self, found: &[Found], view: &View) {
         let added = self.add(found);
-        let members = &self.cells[added.start as usize..added.end as usize];
-        if members.len() < 2 {
-            // All others lie before the near plane or beside the picture.
-            if !added.is_empty() {
-                self.runs.push(Run::Sorted(added));
-            }
-            return;
+        let first_tile = self.tiles.len() as u32;
+        let columns = view.width.div_ceil(TILE);
+        let size = [f64::from(view.width), f64::from(view.height)];
+        let mut inside: Vec<(u32, u32)> = Vec::new(); // tile, cell
+        for cell in added {
+            let corners =
+                || self.cells[cell as usize].outline.into_iter().flat_map(|[x, y, z, w]| [[x, y], [z, w]]);
+            let [across, down] = [0, 1].map(|axis| {
+                let pixels = corners().map(|corner| (0.5 + 0.5 * f64::from(corner[axis])) * size[axis]);
+                let (low, high) =
+                    pixels.fold((f64::INFINITY, 0.0), |(low, high), x| (low.min(x), x.max(high)));
+                // A pixel more on either side than outlines in f32 can be off.
+                let tile = |pixel: f64| pixel.clamp(0.0, size[axis] - 1.0) as u32 / TILE;
+                tile(low - 1.0)..=tile(high + 1.0)
+            });
+            inside.extend(down.flat_map(|y| across.clone().map(move |x| (y * columns + x, cell))));
         }
-        let corners =
-            || members.iter().flat_map(|cell| cell.outline).flat_map(|[x, y, z, w]| [[x, y], [z, w]]);
-        let least =
-            corners().fold([f32::INFINITY; 2], |m, corner| [m[0].min(corner[0]), m[1].min(corner[1])]);
-        let most =
-            corners().fold([f32::NEG_INFINITY; 2], |m, corner| [m[0].max(corner[0]), m[1].max(corner[1])]);
-        self.runs.push(Run::Cycle(self.cycles.len() as u32));
-        self.cycles.push(Cycle {
-            bounds: [least[0], least[1], most[0], most[1]],
-            members: [added.start, added.end],
-            padding: [0; 2],
-        });
+        inside.sort_unstable();
+        for tile in inside.chunk_by(|a, b| a.0 == b.0) {
+            let first = self.members.len() as u32;
+            self.members.extend(tile.iter().map(|(_, cell)| cell));
+            let [x, y] = [tile[0].0 % columns * TILE, tile[0].0 / columns * TILE];
+            let clip = |pixel: u32, axis: usize| (2.0 * f64::from(pixel) / size[axis] - 1.0) as f32;
+            self.tiles.push(Tile {
+                bounds: [clip(x, 0), clip(y, 1), clip(x + TILE, 0), clip(y + TILE, 1)],
+                members: [first, self.members.len() as u32],
+                padding: [0; 2],
+            });
+        }
+        self.runs.push(Run::Cycle(first_tile..self.tiles.len() as u32));
     }
 
     /// Keeps those that can be seen, counts the others.
