@@ -272,20 +272,24 @@ fn levels_of_detail_are_blended_along_the_ray() {
     let volume = Pyramid { levels: vec![level([8, 8, 8], fine), level([4, 4, 4], coarse)] };
     let view = view(DVec3::new(0.1, 1.4, 0.2), DVec3::new(0.8, 0.0, 0.1), 5);
     let mut scene = scene(flat_shell(), volume, view);
-    // Texels per unit: 8 over the thickness, 8 over the side.
+    // Texels per unit: 8 over the thickness, 8 over a side; as much of them counts as lies across the ray.
     let pixel = 2.0 * (0.5 * view.camera.fov_y).tan() / 5.0;
-    let rho = 8.0 / THICKNESS;
-    // Level 0 ends at depth 1.
-    scene.medium.lod_footprint = 1.0 / (pixel * rho);
+    let rho = |direction: DVec3| {
+        let DVec3 { x, y, z } = direction.normalize();
+        (8.0 / THICKNESS * x.hypot(z)).max(8.0 / SIDE * y.hypot(z)).max(8.0 / SIDE * x.hypot(y))
+    };
+    // Level 0 ends near depth 1.
+    scene.medium.lod_footprint = 1.0 / (pixel * rho(view.camera.target - view.camera.eye));
     let reference = Reference::new(&scene, &view);
     let mut blended = 0;
     for (point, direction) in rays(&view) {
         let [enter, exit] = [THICKNESS, 0.0].map(|y| (y - view.camera.eye.y) / direction.y);
+        let level_0_ends = 1.0 / (scene.medium.lod_footprint * pixel * rho(direction));
         let sigma = |z: f64| {
-            let part = z.log2().clamp(0.0, 1.0);
+            let part = (z / level_0_ends).log2().clamp(0.0, 1.0);
             -(1.0 - (f64::from(fine) * (1.0 - part) + f64::from(coarse) * part)).ln()
         };
-        // Simpson's rule, between the kinks at depths 1 and 2.
+        // Simpson's rule, between the kinks where level 0 ends and level 1 begins.
         let simpson = |from: f64, to: f64| {
             let steps = 1000;
             let h = (to - from) / f64::from(steps);
@@ -293,14 +297,15 @@ fn levels_of_detail_are_blended_along_the_ray() {
             let inner: f64 = (1..steps).map(|i| f64::from(2 + 2 * (i % 2)) * at(i)).sum();
             h / 3.0 * (at(0) + inner + at(steps))
         };
-        let cuts = [enter, 1.0_f64.clamp(enter, exit), 2.0_f64.clamp(enter, exit), exit];
+        let [first, second] = [1.0, 2.0].map(|times| (times * level_0_ends).clamp(enter, exit));
+        let cuts = [enter, first, second, exit];
         let depth: f64 = cuts.windows(2).map(|cut| simpson(cut[0], cut[1])).sum();
         let total = 1.0 - (-depth * direction.length() / OPACITY_DISTANCE).exp();
         // Simpson errs by h^4 (to - from) / 180 times a fourth derivative of a few tens: below 1e-12.
         assert!(
             error(&reference.integrate_ray(point).rgba, &[total, 0.5 * total, 0.0, total]) <= 2.0 * TOLERANCE
         );
-        blended += usize::from(enter < 2.0 && exit > 1.0);
+        blended += usize::from(enter < 2.0 * level_0_ends && exit > level_0_ends);
     }
     assert_eq!(blended, 25);
 }
@@ -457,7 +462,8 @@ fn brute_force(scene: &Scene, view: &View, direction: DVec3, range: [f64; 2], st
             }
             let texture = (0..4).map(|k| b[k] * shell.texture[t][k]).sum();
             let map = shell.cells[t].texture_from_world.transpose();
-            let rho = (0..3).map(|i| size[i] * map.col(i).length()).fold(0.0, f64::max);
+            let across = |i: usize| map.col(i).reject_from(direction).length();
+            let rho = (0..3).map(|i| size[i] * across(i)).fold(0.0, f64::max);
             let last = scene.volume.levels.len() - 1;
             let lod = (scene.medium.lod_footprint * z * pixel * rho).log2().clamp(0.0, last as f64);
             let level = (lod as usize).min(last);
