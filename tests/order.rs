@@ -3,7 +3,6 @@
 mod common;
 
 use std::f64::consts::TAU;
-use std::sync::Arc;
 
 use common::{interlocking_bar, loose};
 use glam::DVec3;
@@ -13,7 +12,7 @@ use mesoshell::order::relations::FaceTable;
 use mesoshell::order::search::InFront;
 use mesoshell::order::{self, Check, Order, Sorter};
 use mesoshell::scene::{Camera, View};
-use mesoshell::shell::{Shell, ShellOptions, Topology};
+use mesoshell::shell::{Shell, ShellOptions};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
