@@ -143,7 +143,7 @@ fn output(path: &Path, message: String) -> Error {
 }
 
 /// An unnamed-to-be file in the directory of `path`, deleted unless it is renamed.
-fn file_beside(path: &Path) -> Result<tempfile::NamedTempFile> {
+pub(crate) fn file_beside(path: &Path) -> Result<tempfile::NamedTempFile> {
     // A rename would put a file in place of a device such as /dev/null.
     if path.exists() && !path.is_file() {
         return Err(output(path, "is there already, and is not a file".into())
@@ -185,7 +185,12 @@ fn check_numbers(path: &Path, image: &Image) -> Result<()> {
     }
 }
 
-fn write_png(writer: impl Write, image: &Image, background: Option<[f32; 3]>) -> Result<(), ImageError> {
+/// The PNG that [`write()`] makes of an image without values that are not numbers.
+pub(crate) fn write_png(
+    writer: impl Write,
+    image: &Image,
+    background: Option<[f32; 3]>,
+) -> Result<(), ImageError> {
     let (width, height) = (image.width, image.height);
     let encoder = PngEncoder::new(writer);
     let byte = |x: f32| (255.0 * x.clamp(0.0, 1.0)).round() as u8;

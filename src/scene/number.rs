@@ -101,6 +101,10 @@ count! {
     /// Samples in one tetrahedron.
     Samples = 1..=4096
 }
+count! {
+    /// Timed frames of one point of a benchmark.
+    Runs = 1..=1000
+}
 
 /// A list of exactly `N` values. (Serde's own arrays let a list be longer.)
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
