@@ -51,13 +51,21 @@ pub fn run(sweep: &Sweep, options: &Options<'_>, setup: &Setup<'_>) -> Result<Ou
         true => resumed(&json, &fresh)?,
         false => fresh,
     };
+    let size = sweep.size.map(|[width, height]| format!("image.size=[{width}, {height}]"));
+    let overrides: Vec<String> = size.into_iter().chain(sweep.define.iter().cloned()).collect();
+    // What keeps a scene from being loaded, or results from being written, is told before anything is measured.
+    for path in &sweep.scenes {
+        setup.progress.stage(&format!("checking {}", path.display()));
+        setup.interrupt.check()?;
+        scene::load(path, &overrides, &Silent)?;
+    }
+    results.write(&json)?;
+
     let mut earlier = std::mem::take(&mut results.scenes).into_iter();
     results.complete = false;
 
     let mut warnings = Vec::new();
     let mut pictures = Vec::new();
-    let size = sweep.size.map(|[width, height]| format!("image.size=[{width}, {height}]"));
-    let overrides: Vec<String> = size.into_iter().chain(sweep.define.iter().cloned()).collect();
     let remaining = Remaining::new(setup.progress.as_ref(), sweep.scenes.len());
     for path in &sweep.scenes {
         remaining.next_scene();

@@ -71,7 +71,7 @@ fn section(page: &mut String, scene: &SceneResults, pictures: &Pictures) {
             legend(curve)
         );
     }
-    *page += "<span><svg class=\"key\" viewBox=\"-8 -8 16 16\"><path class=\"front\" d=\"M-8 -4H0V4H8\"/></svg> \
+    *page += "<span><svg class=\"wide key\" viewBox=\"-16 -8 32 16\"><path class=\"front\" d=\"M-16-6H0V6H16\"/></svg> \
               Pareto front</span>\n</figcaption>\n</figure>\n";
     table(page, scene);
     *page += "</div>\n";

@@ -8,12 +8,12 @@ use crate::bench::convergence::ROUNDING_FLOOR;
 use crate::bench::results::{Curve, Point, SceneResults};
 
 /// The drawing, in its own units.
-const WIDTH: f64 = 760.0;
-const HEIGHT: f64 = 420.0;
+const WIDTH: f64 = 600.0;
+const HEIGHT: f64 = 380.0;
 const LEFT: f64 = 62.0;
-const RIGHT: f64 = 742.0;
+const RIGHT: f64 = 588.0;
 const TOP: f64 = 14.0;
-const BOTTOM: f64 = 372.0;
+const BOTTOM: f64 = 334.0;
 
 /// The least error that is drawn; what is below stands there.
 const LEAST_ERROR: f64 = 1e-9;
@@ -39,16 +39,16 @@ impl Axis {
         self.ends.start + part * (self.ends.end - self.ends.start)
     }
 
-    /// Powers of ten, where there are few also their double and fivefold.
+    /// Powers of ten; where these are few, multiples of them too.
     fn ticks(&self) -> Vec<f64> {
         let exponents = self.values.start.log10().floor() as i32..=self.values.end.log10().ceil() as i32;
-        let ticks = |factors: &'static [f64]| -> Vec<f64> {
-            let ticks =
-                exponents.clone().flat_map(|exponent| factors.iter().map(move |f| f * 10f64.powi(exponent)));
+        let ticks = |multiples: &[f64]| -> Vec<f64> {
+            let decades = exponents.clone().map(|exponent| 10_f64.powi(exponent));
+            let ticks = decades.flat_map(|decade| multiples.iter().map(move |multiple| multiple * decade));
             ticks.filter(|tick| self.values.contains(tick)).collect()
         };
-        let decades = ticks(&[1.0]);
-        if decades.len() >= 3 { decades } else { ticks(&[1.0, 2.0, 5.0]) }
+        let fine = ticks(&[1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0]);
+        [ticks(&[1.0]), ticks(&[1.0, 2.0, 5.0])].into_iter().find(|ticks| ticks.len() >= 3).unwrap_or(fine)
     }
 }
 
@@ -176,12 +176,12 @@ mod tests {
         assert!((axis.place(1e3) - 400.0).abs() < 1e-9);
         assert_eq!(axis.ticks(), [1.0, 10.0, 100.0, 1000.0]);
         let short = Axis { values: 15.0..60.0, ends: 0.0..1.0 };
-        assert_eq!(short.ticks(), [20.0, 50.0]);
+        assert_eq!(short.ticks(), [15.0, 20.0, 30.0, 40.0, 50.0]);
     }
 
     #[test]
     fn the_front_is_a_staircase() {
-        assert_eq!(staircase(&[[100.0, 50.0], [200.0, 90.0]]), "M100.0 14V50.0H200.0V90.0H742");
+        assert_eq!(staircase(&[[100.0, 50.0], [200.0, 90.0]]), "M100.0 14V50.0H200.0V90.0H588");
         assert_eq!(staircase(&[]), "");
     }
 
