@@ -133,6 +133,8 @@ pub enum Plan {
     Default,
     /// The same number in every tetrahedron.
     Paper,
+    /// Cell by cell.
+    Exact,
 }
 
 impl Default for ImageSection {

@@ -107,6 +107,7 @@ fn build(text: &Text, base_dir: &Path, progress: &dyn Progress) -> Result<Loaded
         march: match file.march.plan {
             Plan::Default => March::Default { step: file.march.step.0 },
             Plan::Paper => March::Paper { samples: file.march.samples.0 },
+            Plan::Exact => March::Exact,
         },
         shell,
         volume,

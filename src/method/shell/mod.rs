@@ -186,7 +186,7 @@ impl Shell {
     fn new_canvas(&self, kind: CanvasKind, seen: &Seen) -> Result<Canvas> {
         let target = Target::new(&self.gpu, kind.width, kind.height, if kind.depth { 2 } else { 1 })?;
         let constants =
-            [u32::from(matches!(self.scene.march, March::Paper { .. })), u32::from(kind.minified)];
+            [plan(self.scene.march), u32::from(kind.minified), 0];
         let pipeline = |vertex, fragment| {
             let info = PipelineInfo {
                 vertex,
@@ -252,11 +252,25 @@ impl Shell {
     }
 }
 
+/// Texels a sample in cycles under the exact plan.
+const CYCLE_STEP: f64 = 0.125;
+
+/// The specialisation constant `PLAN` of `glsl/include/march.glsl`.
+fn plan(march: March) -> u32 {
+    match march {
+        March::Default { .. } => 0,
+        March::Paper { .. } => 1,
+        March::Exact => 2,
+    }
+}
+
 fn constants(scene: &Scene, view: &View) -> ViewConstants {
     let pixel = view.pixel_at_unit_depth();
     let (step, samples) = match scene.march {
         March::Paper { samples } => (1.0, samples),
         March::Default { step } => (step, 1),
+        // Of cycles alone, which are always marched by midpoints.
+        March::Exact => (CYCLE_STEP, 1),
     };
     ViewConstants {
         centre: [0.5 * view.width as f32, 0.5 * view.height as f32],
