@@ -15,14 +15,14 @@ use mesoshell::mesh::generate::{Generator, Sphere};
 use mesoshell::metric;
 use mesoshell::scene::{March, Medium, Scene, View};
 use mesoshell::shell::{Shell, ShellOptions};
-use mesoshell::volume::{Pyramid, Volume};
+use mesoshell::volume::{Pyramid, Quantity, Volume};
 
 const BOUND: f64 = 1e-4;
 
 /// Columns of the texture, each of one straight colour and alpha.
 fn columns(colours: &[([f32; 3], f32)]) -> Pyramid {
     let texels = colours.iter().map(|([r, g, b], a)| [r * a, g * a, b * a, *a]).collect();
-    Pyramid::build(Volume { size: [colours.len() as u32, 1, 1], texels })
+    Pyramid::build(Volume { size: [colours.len() as u32, 1, 1], texels, quantity: Quantity::Opacity })
 }
 
 fn scene(shell: Shell, volume: Pyramid, view: View) -> Arc<Scene> {

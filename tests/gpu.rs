@@ -5,7 +5,7 @@ use mesoshell::Error;
 use mesoshell::gpu::{
     DeviceChoice, Gpu, Messages, Pipeline, PipelineInfo, Target, Texture3d, devices, shaders,
 };
-use mesoshell::volume::{Pyramid, Volume};
+use mesoshell::volume::{Pyramid, Quantity, Volume};
 
 fn watched(test: impl FnOnce(&std::sync::Arc<Gpu>)) {
     let messages = Messages::default();
@@ -18,7 +18,7 @@ fn watched(test: impl FnOnce(&std::sync::Arc<Gpu>)) {
 
 fn empty(size: [u32; 3]) -> Pyramid {
     let texels = size.iter().map(|side| *side as usize).product();
-    Pyramid { levels: vec![Volume { size, texels: vec![[0.0; 4]; texels] }] }
+    Pyramid { levels: vec![Volume { size, texels: vec![[0.0; 4]; texels], quantity: Quantity::Opacity }] }
 }
 
 #[test]

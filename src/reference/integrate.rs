@@ -28,6 +28,7 @@ use super::quadrature::{AtNodes, NODES, Rule, dot};
 use super::texture::{ALPHA, CLEAR, Cubic, Lattice, Texel};
 use super::{Counts, Reference, Sample};
 use crate::scene::Scene;
+use crate::volume::Quantity;
 
 /// Width, as a part of its piece, of the panels that are taken as they are: see the head of this file.
 const NARROWEST: f64 = 1e-15;
@@ -223,7 +224,8 @@ impl<'a> RayIntegral<'a> {
             return;
         }
         let piece = Piece { start: span_start + from, length: to - from };
-        if self.layers.iter().any(Layer::is_wall) {
+        let can_be_wall = self.scene.volume.levels[0].quantity == Quantity::Opacity;
+        if can_be_wall && self.layers.iter().any(Layer::is_wall) {
             self.stop_at_wall(piece.start);
         } else {
             self.panels(piece, 0.0, 1.0);
@@ -273,13 +275,17 @@ impl<'a> RayIntegral<'a> {
         let rule = self.rule;
         let width = high - low;
         let opacity_distance = self.scene.medium.opacity_distance;
+        let quantity = self.scene.volume.levels[0].quantity;
         let mut extinction: AtNodes = [0.0; NODES];
         let mut emission: [AtNodes; 3] = [[0.0; NODES]; 3];
         for i in 0..NODES {
             let x = low + width * rule.nodes[i];
             for layer in &self.layers {
                 let texel = layer.at(x, piece.start + x * piece.length);
-                let per_alpha = extinction_per_alpha(texel[ALPHA], texel[CLEAR]);
+                let per_alpha = match quantity {
+                    Quantity::Opacity => extinction_per_alpha(texel[ALPHA], texel[CLEAR]),
+                    Quantity::Extinction => 1.0,
+                };
                 extinction[i] += per_alpha * texel[ALPHA];
                 for (emission, premultiplied) in emission.iter_mut().zip(texel) {
                     emission[i] += per_alpha * premultiplied;

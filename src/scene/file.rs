@@ -77,6 +77,8 @@ pub struct VolumeSection {
     pub file: Option<PathBuf>,
     /// How the scalars of a file become colour and opacity.
     pub transfer: Option<TransferFunction>,
+    /// How the scalars of a file become extinction.
+    pub density: Option<DensitySection>,
     /// The opacity of every texel of a file that has red, green and blue alone.
     pub alpha: Option<Fraction>,
     /// World units; by default one level-0 texel along w.
@@ -84,6 +86,16 @@ pub struct VolumeSection {
     /// In pixels.
     #[serde(default = "one_pixel")]
     pub lod_footprint: NotNegative,
+}
+
+/// `[volume.density]`: the scalars of a file are densities.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DensitySection {
+    /// Extinction where the file says 1, per world unit.
+    pub extinction: Positive,
+    /// Linear RGB; by default white.
+    pub colour: Option<Exactly<3, NotNegative>>,
 }
 
 /// `[camera]`.

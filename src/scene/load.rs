@@ -7,7 +7,7 @@ use glam::{DVec2, DVec3};
 use toml::Spanned;
 
 use super::camera::DEFAULT_NEAR;
-use super::file::{CameraSection, MeshSection, Plan, SceneFile, VolumeSection};
+use super::file::{CameraSection, DensitySection, MeshSection, Plan, SceneFile, VolumeSection};
 use super::number::{Exactly, Finite};
 use super::text::Text;
 use super::{Camera, March, Medium, Scene, View};
@@ -88,6 +88,8 @@ fn build(text: &Text, base_dir: &Path, progress: &dyn Progress) -> Result<Loaded
 
     progress.stage("loading the volume");
     let section = file.volume.get_ref();
+    // The path that a density of 1 makes one optical depth long.
+    let mean_free_path = section.density.as_ref().map(|density| density.extinction.0.recip());
     let volume = volume.load(base_dir)?;
     let texel_along_w = options.thickness / f64::from(volume.size[2]);
     stopwatch.lap("load.volume");
@@ -101,7 +103,9 @@ fn build(text: &Text, base_dir: &Path, progress: &dyn Progress) -> Result<Loaded
     let scene = Scene {
         view: View { camera, width, height, depth: false },
         medium: Medium {
-            opacity_distance: section.opacity_distance.map_or(texel_along_w, |distance| distance.0),
+            opacity_distance: mean_free_path
+                .or(section.opacity_distance.map(|distance| distance.0))
+                .unwrap_or(texel_along_w),
             lod_footprint: section.lod_footprint.0,
         },
         march: match file.march.plan {
@@ -156,11 +160,21 @@ enum VolumeSource<'a> {
 impl<'a> VolumeSource<'a> {
     fn of(text: &Text, section: &'a Spanned<VolumeSection>) -> Result<Self> {
         match section.get_ref() {
-            VolumeSection { recipe: Some(path), file: None, transfer: None, alpha: None, .. } => {
+            VolumeSection {
+                recipe: Some(path), file: None, transfer: None, density: None, alpha: None, ..
+            } => {
                 Ok(Self::Recipe(path))
             }
-            VolumeSection { recipe: None, file: Some(path), transfer, alpha, .. } => {
+            VolumeSection { density: Some(_), opacity_distance: Some(_), .. } => Err(text.error(
+                section.span(),
+                "[volume.density] says itself how dense the volume is: leave out `opacity_distance`",
+            )),
+            VolumeSection { recipe: None, file: Some(path), transfer, density, alpha, .. } => {
+                let colour = |density: &DensitySection| {
+                    density.colour.as_ref().map_or([1.0; 3], |rgb| rgb.0.map(|x| x.0 as f32))
+                };
                 let interpretation = Interpretation {
+                    density: density.as_ref().map(colour),
                     alpha_mode: None,
                     constant_alpha: alpha.map(|alpha| alpha.0 as f32),
                     transfer: transfer.clone(),
@@ -169,7 +183,7 @@ impl<'a> VolumeSource<'a> {
             }
             _ => Err(text.error(
                 section.span(),
-                "[volume] needs either `recipe`, or `file` with what it may need of `transfer` and `alpha`",
+                "[volume] needs either `recipe`, or `file` with what it may need of `transfer`, `density` and `alpha`",
             )),
         }
     }

@@ -49,7 +49,8 @@ pub struct Scene {
 /// What the texture means. It belongs to the medium, not to the march: the reference obeys it too.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Medium {
-    /// The path length, in world units, whose opacity the texture's alpha is.
+    /// The path length, in world units, whose opacity, or optical depth, the texture's alpha is: see
+    /// [`Quantity`](crate::volume::Quantity).
     pub opacity_distance: f64,
     /// The filter footprint in pixels (1 = one pixel; 0 = always level 0).
     ///

@@ -21,6 +21,7 @@ use crate::gpu::{Batch, Buffer, Draw, Gpu, Pipeline, PipelineInfo, Target, Textu
 use crate::order::{Sorted, Sorter};
 use crate::progress::{Interrupt, Progress};
 use crate::scene::{March, Scene, View};
+use crate::volume::Quantity;
 
 /// The push constants of `glsl/include/shell.glsl`: see there for each member.
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
@@ -185,8 +186,11 @@ impl Shell {
 
     fn new_canvas(&self, kind: CanvasKind, seen: &Seen) -> Result<Canvas> {
         let target = Target::new(&self.gpu, kind.width, kind.height, if kind.depth { 2 } else { 1 })?;
-        let constants =
-            [plan(self.scene.march), u32::from(kind.minified), 0];
+        let constants = [
+            plan(self.scene.march),
+            u32::from(kind.minified),
+            u32::from(self.scene.volume.levels[0].quantity == Quantity::Extinction),
+        ];
         let pipeline = |vertex, fragment| {
             let info = PipelineInfo {
                 vertex,

@@ -36,7 +36,7 @@ pub use keys::Colour;
 pub use rocks::Rocks;
 pub use weave::Weave;
 
-use super::Volume;
+use super::{Quantity, Volume};
 use crate::{Error, Result};
 use grid::Grid;
 use keys::{Keys, keys};
@@ -147,7 +147,7 @@ impl Recipe {
         texels.resize(count, [0.; 4]);
         let grid = Grid { size: size.map(|n| n as usize), height: self.header.height };
         self.pattern.draw(&grid, self.header.seed, &mut texels);
-        Ok(Volume { size, texels })
+        Ok(Volume { size, texels, quantity: Quantity::Opacity })
     }
 }
 
