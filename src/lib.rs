@@ -36,6 +36,7 @@ pub mod mesh;
 pub mod method;
 pub mod metric;
 pub mod order;
+mod output;
 pub mod progress;
 pub mod reference;
 pub mod scene;

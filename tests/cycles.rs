@@ -14,7 +14,7 @@ use mesoshell::mesh::Mesh;
 use mesoshell::mesh::generate::{Generator, Sphere};
 use mesoshell::metric;
 use mesoshell::scene::{March, Medium, Scene, View};
-use mesoshell::shell::{Shell, ShellOptions};
+use mesoshell::shell::{Cell, Shell, ShellOptions};
 use mesoshell::volume::{Pyramid, Quantity, Volume};
 
 const BOUND: f64 = 1e-4;
@@ -73,6 +73,30 @@ fn a_wrong_order_would_be_seen() {
     let swapped = scene(ring(3), columns(&[b, a, c]), view);
     let pictures = [right, swapped].map(|scene| Watched::prepare("shell", &scene).render(&view).image);
     assert!(metric::compare(&pictures[0], &pictures[1]).unwrap().max > 0.1);
+}
+
+#[test]
+fn a_cycle_before_the_near_plane_is_left_out() {
+    let mut view = view(DVec3::new(0.0, 0.0, 8.0), DVec3::ZERO, 24.0, 0.01, 160);
+    view.camera.near = 20.0;
+    let frame = Watched::prepare("shell", &scene(ring(3), columns(&PAINTS), view)).render(&view);
+    assert_eq!(frame.report.counts["tetrahedra_in_cycles"], 3);
+    assert_eq!(frame.report.counts["tetrahedra_drawn"], 0);
+    assert!(frame.image.rgba.iter().all(|pixel| *pixel == [0.0; 4]));
+}
+
+#[test]
+fn a_tetrahedron_too_small_for_its_maps_is_left_out() {
+    // Seen from afar it has an outline, a pixel or so of margin; without maps nothing is known of what is in it.
+    let mut shell = ring(3);
+    let view = view(DVec3::new(0.0, 0.0, 8.0), DVec3::ZERO, 24.0, 0.01, 160);
+    let drawn = |shell: Shell| {
+        let frame = Watched::prepare("shell", &scene(shell, columns(&PAINTS), view)).render(&view);
+        frame.report.counts["tetrahedra_drawn"]
+    };
+    assert_eq!(drawn(shell.clone()), 5);
+    shell.cells[0] = Cell::default();
+    assert_eq!(drawn(shell), 4);
 }
 
 /// Two shells through one another, the second shifted by its own radius.

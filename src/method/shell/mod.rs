@@ -136,16 +136,13 @@ impl Method for Shell {
         self.interrupt.check()?;
         self.progress.stage("marching");
         let batches: Vec<Batch<'_>> = seen.runs.iter().map(|run| canvas.batch(run)).collect();
-        let times = draw(
-            &self.gpu,
-            &Draw {
-                target: &canvas.target,
-                buffers: &[&canvas.cells, &canvas.tiles, &canvas.members],
-                textures: &[&self.volume],
-                push_constants: bytemuck::bytes_of(&constants(&self.scene, view)),
-                batches: &batches,
-            },
-        )?;
+        let times = draw(&Draw {
+            target: &canvas.target,
+            buffers: &[&canvas.cells, &canvas.tiles, &canvas.members],
+            textures: &[&self.volume],
+            push_constants: bytemuck::bytes_of(&constants(&self.scene, view)),
+            batches: &batches,
+        })?;
         watch.lap("march");
         if let Some(times) = times {
             watch.add("march.device", times.draw);
