@@ -11,11 +11,11 @@ use serde::Deserialize;
 use toml::Spanned;
 
 use super::camera::DEFAULT_FOV_DEGREES;
-use super::number::{
-    Exactly, FieldOfView, Finite, Fraction, NotNegative, PictureSize, Pixels, Positive, Rounds, Samples, Step,
-};
 use crate::mesh::generate::Generator;
 use crate::mesh::projection::Projection;
+use crate::value::{
+    Exactly, FieldOfView, Finite, Fraction, NotNegative, PictureSize, Pixels, Positive, Rounds, Samples, Step,
+};
 use crate::volume::TransferFunction;
 
 /// A whole scene file.

@@ -8,7 +8,6 @@ use toml::Spanned;
 
 use super::camera::DEFAULT_NEAR;
 use super::file::{CameraSection, MeshSection, Plan, SceneFile, VolumeSection};
-use super::number::{Exactly, Finite};
 use super::text::Text;
 use super::{Camera, March, Medium, Scene, View};
 use crate::frame::{Stage, Stopwatch};
@@ -17,6 +16,7 @@ use crate::mesh::projection::Projection;
 use crate::mesh::{Mesh, obj};
 use crate::progress::{Progress, Silent};
 use crate::shell::{Shell, ShellOptions};
+use crate::value::{Exactly, Finite};
 use crate::volume::{self, Interpretation, Pyramid, Volume, recipe};
 use crate::{Error, Result};
 

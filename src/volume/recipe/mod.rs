@@ -37,6 +37,7 @@ pub use rocks::Rocks;
 pub use weave::Weave;
 
 use super::Volume;
+use crate::value::exactly;
 use crate::{Error, Result};
 use grid::Grid;
 use keys::{Keys, keys};
@@ -67,6 +68,7 @@ keys! {
         /// Which recipe: `"fur"`, `"fog"`, ... Must be given.
         recipe: String = String::new();
         /// Texels along u, v, w; each at least 1, all together at most [`MAX_TEXELS`].
+        #[serde(deserialize_with = "exactly")]
         size: [u32; 3] = [128, 128, 32];
         /// Another seed gives another volume of the same kind.
         seed: u32 = 1;

@@ -1,7 +1,9 @@
-//! Numbers that cannot hold a value out of their range: what a scene file's keys are made of.
+//! Numbers that cannot hold a value out of their range.
 
 use serde::Deserialize;
 use serde::de::{Deserializer, Error, Unexpected, Visitor};
+
+use super::Exactly;
 
 /// Declares a number whose range is checked as it is read; the second line says the range in words.
 macro_rules! number {
@@ -100,22 +102,6 @@ count! {
 count! {
     /// Samples in one tetrahedron.
     Samples = 1..=4096
-}
-
-/// A list of exactly `N` values. (Serde's own arrays let a list be longer.)
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
-#[serde(try_from = "Vec<T>", bound = "T: Deserialize<'de>")]
-pub struct Exactly<const N: usize, T>(pub [T; N]);
-
-impl<const N: usize, T> TryFrom<Vec<T>> for Exactly<N, T> {
-    type Error = String;
-
-    fn try_from(list: Vec<T>) -> Result<Self, String> {
-        let values = list.try_into();
-        values
-            .map(Self)
-            .map_err(|list: Vec<T>| format!("invalid length {}, expected a list of {N}", list.len()))
-    }
 }
 
 /// Width and height of a picture that fits into memory: at most 2^28 pixels.
