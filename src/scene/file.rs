@@ -14,7 +14,8 @@ use super::camera::DEFAULT_FOV_DEGREES;
 use crate::mesh::generate::Generator;
 use crate::mesh::projection::Projection;
 use crate::value::{
-    Exactly, FieldOfView, Finite, Fraction, NotNegative, PictureSize, Pixels, Positive, Rounds, Samples, Step,
+    Colour, Exactly, FieldOfView, Finite, Fraction, NotNegative, PictureSize, Pixels, Positive, Rounds,
+    Samples, Step,
 };
 use crate::volume::TransferFunction;
 
@@ -109,8 +110,8 @@ pub struct CameraSection {
 pub struct ImageSection {
     /// Width and height.
     pub size: PictureSize,
-    /// Linear RGB; a transparent picture without it.
-    pub background: Option<Exactly<3, NotNegative>>,
+    /// What lies behind the shell; a transparent picture without it.
+    pub background: Option<Colour>,
 }
 
 /// `[march]`.

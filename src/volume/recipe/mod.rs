@@ -7,7 +7,8 @@
 //! density = 4000
 //! ```
 //!
-//! [`Header`] lists the keys that every recipe has; [`Fog`], [`Fur`] and the others list their own. A recipe
+//! [`Header`] lists the keys that every recipe has; [`Fog`], [`Fur`] and the others list their own. Colours are written
+//! `"#rrggbb"` (sRGB) or `[red, green, blue]` (linear): see [`Colour`](crate::value::Colour). A recipe
 //! yields the same bytes whatever the number of threads, and its volume repeats in u and v without a seam.
 
 mod clouds;
@@ -32,7 +33,6 @@ use toml::de::{DeTable, DeValue, ValueDeserializer};
 pub use clouds::Clouds;
 pub use fog::Fog;
 pub use fur::Fur;
-pub use keys::Colour;
 pub use rocks::Rocks;
 pub use weave::Weave;
 
