@@ -1,6 +1,7 @@
 //! Numbers that cannot hold a value out of their range.
 
 use serde::Deserialize;
+use serde::de::value::I64Deserializer;
 use serde::de::{Deserializer, Error, Unexpected, Visitor};
 
 use super::Exactly;
@@ -108,6 +109,20 @@ count! {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(try_from = "Exactly<2, Pixels>")]
 pub struct PictureSize(pub [Pixels; 2]);
+
+impl PictureSize {
+    /// The size of so many pixels.
+    ///
+    /// # Errors
+    /// What is out of range, in words.
+    pub fn new(width: u32, height: u32) -> Result<Self, String> {
+        let side = |pixels: u32| {
+            let pixels = I64Deserializer::<serde::de::value::Error>::new(pixels.into());
+            Pixels::deserialize(pixels).map_err(|error| error.to_string())
+        };
+        Ok(Exactly([side(width)?, side(height)?]).try_into()?)
+    }
+}
 
 impl TryFrom<Exactly<2, Pixels>> for PictureSize {
     type Error = &'static str;
