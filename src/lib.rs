@@ -41,6 +41,7 @@ pub mod progress;
 pub mod reference;
 pub mod scene;
 pub mod shell;
+pub mod value;
 pub mod volume;
 
 pub use error::{Error, Result};

@@ -75,7 +75,11 @@ fn a_picture_without_pixels_is_refused() {
 #[test]
 fn a_pyramid_that_breaks_its_promises_reaches_no_device() {
     watched(|gpu| {
-        let level = |size: [u32; 3], texels| Volume { size, texels: vec![[0.0; 4]; texels] };
+        let level = |size: [u32; 3], texels| Volume {
+            size,
+            texels: vec![[0.0; 4]; texels],
+            quantity: Quantity::Opacity,
+        };
         for levels in [
             vec![],
             vec![level([4, 4, 4], 63)],

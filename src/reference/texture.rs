@@ -1,7 +1,7 @@
 //! The texture along a ray: trilinear reconstruction as one cubic polynomial a cell.
 //!
-//! Texel centres lie at `(i + 1/2) / n`; u and v repeat, w clamps to the edge (DESIGN section 1, and
-//! Vulkan 1.3, "Texel Filtering"). A *cell* is the box between eight neighbouring texel centres. Texture
+//! Texel centres lie at `(i + 1/2) / n`; u and v repeat, w clamps to the edge (Vulkan 1.3, "Texel
+//! Filtering"). A *cell* is the box between eight neighbouring texel centres. Texture
 //! coordinates are affine in the ray's depth, so within a cell the reconstruction is a product of
 //! three linear functions: a cubic, kept in Bernstein form. Its coefficients are weighted means
 //! of the corners, so `1 - alpha` is a sum of terms that are not negative and keeps its relative accuracy

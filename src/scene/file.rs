@@ -11,11 +11,12 @@ use serde::Deserialize;
 use toml::Spanned;
 
 use super::camera::DEFAULT_FOV_DEGREES;
-use super::number::{
-    Exactly, FieldOfView, Finite, Fraction, NotNegative, PictureSize, Pixels, Positive, Rounds, Samples, Step,
-};
 use crate::mesh::generate::Generator;
 use crate::mesh::projection::Projection;
+use crate::value::{
+    Colour, Exactly, FieldOfView, Finite, Fraction, NotNegative, PictureSize, Pixels, Positive, Rounds,
+    Samples, Step,
+};
 use crate::volume::TransferFunction;
 
 /// A whole scene file.
@@ -121,8 +122,8 @@ pub struct CameraSection {
 pub struct ImageSection {
     /// Width and height.
     pub size: PictureSize,
-    /// Linear RGB; a transparent picture without it.
-    pub background: Option<Exactly<3, NotNegative>>,
+    /// What lies behind the shell; a transparent picture without it.
+    pub background: Option<Colour>,
 }
 
 /// `[march]`.

@@ -8,7 +8,6 @@ use toml::Spanned;
 
 use super::camera::DEFAULT_NEAR;
 use super::file::{CameraSection, DensitySection, MeshSection, Plan, SceneFile, VolumeSection};
-use super::number::{Exactly, Finite};
 use super::text::Text;
 use super::{Camera, March, Medium, Scene, View};
 use crate::frame::{Stage, Stopwatch};
@@ -17,6 +16,7 @@ use crate::mesh::projection::Projection;
 use crate::mesh::{Mesh, obj};
 use crate::progress::{Progress, Silent};
 use crate::shell::{Shell, ShellOptions};
+use crate::value::{Exactly, Finite};
 use crate::volume::{self, Interpretation, Pyramid, Volume, recipe};
 use crate::{Error, Result};
 
@@ -116,7 +116,7 @@ fn build(text: &Text, base_dir: &Path, progress: &dyn Progress) -> Result<Loaded
         shell,
         volume,
     };
-    let background = file.image.background.map(|rgb| rgb.0.map(|x| x.0 as f32));
+    let background = file.image.background.map(|colour| colour.0.to_array());
     Ok(Loaded { scene, background, stages: stopwatch.finish() })
 }
 
@@ -273,6 +273,8 @@ recipe = "fog.toml"
         assert_eq!(scene.medium.opacity_distance, 1.0);
         assert_eq!(scene.march, March::Paper { samples: 3 });
         assert_eq!(background, Some([0.0, 0.5, 1.0]));
+        let background = loaded(&["image.background=#ff0000"]).unwrap().background;
+        assert_eq!(background, Some([1.0, 0.0, 0.0]));
         assert_eq!((scene.view.camera.eye.z, scene.view.camera.near), (9.0, 2.0));
         assert_eq!(scene.view.camera.fov_y, std::f64::consts::FRAC_PI_2);
         // A row of the five spans a fifth of the texture's 3.5 repeats.
@@ -306,6 +308,14 @@ recipe = "fog.toml"
         ["[mesh]", "[image]\nsize = [9, 32769]\n[mesh]", "32769", "from 1 to 32768"],
         ["[mesh]", "[image]\nsize = [32768, 32768]\n[mesh]", "[32768, 32768]", "2^28 pixels"],
         ["[mesh]", "[image]\nbackground = [0, -1, 0]\n[mesh]", "-1", "at least 0"],
+        ["[mesh]", "[image]\nbackground = '#12345'\n[mesh]", "'#12345'", "a colour such as"],
+        ["[mesh]", "[image]\nbackground = [0, 1, 0, 1]\n[mesh]", "[0, 1, 0, 1]", "a list of 3"],
+        [
+            "\"fog.toml\"",
+            "\"fog.toml\"\ntransfer.points = [{ value = 0, colour = 'red', alpha = 1 }]",
+            "'red'",
+            "a colour",
+        ],
         ["[mesh]", "[march]\nplan = 'papr'\n[mesh]", "'papr'", "`default` or `paper`"],
         ["[mesh]", "[march]\nsamples = 0\n[mesh]", "0", "from 1 to 4096"],
         ["[mesh]", "[march]\nstep = 0\n[mesh]", "0", "from 0.001"],
@@ -360,6 +370,7 @@ recipe = "fog.toml"
             ("mesh.file=", "value"),
             ("[shell]\nthickness=1", "not a dotted key"),
             ("camera.eye=[0,0,1]", "missing key `target`"),
+            ("image.background=#12345", "a colour such as"),
         ];
         for (text, part) in mistakes {
             // One that is right stands before, so that blame must find its way.

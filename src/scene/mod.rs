@@ -20,7 +20,6 @@
 pub mod camera;
 pub mod file;
 pub mod load;
-mod number;
 mod text;
 
 pub use camera::{Camera, View};

@@ -101,6 +101,7 @@ fn premultiplied([red, green, blue, alpha]: [f32; 4], mode: AlphaMode) -> [f32; 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::value::Colour;
     use crate::volume::ControlPoint;
 
     fn raw(channels: u32, values: &[f32]) -> RawVolume {
@@ -116,7 +117,7 @@ mod tests {
     }
 
     fn transfer() -> TransferFunction {
-        let point = |value, alpha| ControlPoint { value, colour: [1.0, 0.5, 0.0], alpha };
+        let point = |value, alpha| ControlPoint { value, colour: Colour::linear(1.0, 0.5, 0.0), alpha };
         TransferFunction::new(vec![point(0.0, 0.0), point(200.0, 1.0)]).unwrap()
     }
 
