@@ -95,8 +95,8 @@ pub struct VolumeSection {
 pub struct DensitySection {
     /// Extinction where the file says 1, per world unit.
     pub extinction: Positive,
-    /// Linear RGB; by default white.
-    pub colour: Option<Exactly<3, NotNegative>>,
+    /// By default white.
+    pub colour: Option<Colour>,
 }
 
 /// `[camera]`.

@@ -171,7 +171,7 @@ impl<'a> VolumeSource<'a> {
             )),
             VolumeSection { recipe: None, file: Some(path), transfer, density, alpha, .. } => {
                 let colour = |density: &DensitySection| {
-                    density.colour.as_ref().map_or([1.0; 3], |rgb| rgb.0.map(|x| x.0 as f32))
+                    density.colour.map_or([1.0; 3], |colour| colour.0.to_array())
                 };
                 let interpretation = Interpretation {
                     density: density.as_ref().map(colour),
