@@ -80,17 +80,18 @@ fn depth_is_that_of_the_reference() {
     scene.view.depth = true;
     let scene = Arc::new(scene);
     let view = scene.view;
-    let depths =
-        ["shell", "reference"].map(|name| Watched::prepare(name, &scene).render(&view).depth.unwrap());
+    let frames = ["shell", "reference"].map(|name| Watched::prepare(name, &scene).render(&view));
+    let [shell, reference] = frames.each_ref().map(|frame| frame.depth.as_ref().unwrap());
     let mut compared = 0;
-    for (shell, reference) in depths[0].iter().zip(&depths[1]) {
-        // Where alpha is tiny the mean is a quotient of two tiny numbers; both are finite or neither.
-        if !shell.is_finite() || !reference.is_finite() {
+    for (i, (shell, reference)) in shell.iter().zip(reference).enumerate() {
+        // The mean is a quotient by alpha, and tells nothing where that is near 0.
+        if frames.iter().any(|frame| frame.image.rgba[i][3] < 0.1) {
             continue;
         }
         compared += 1;
-        // The shell is 0.25 thick and a texel an eighth of a hundredth of that; silhouettes of the shell see little of it.
-        assert!((shell - reference).abs() < 0.02, "{shell} for {reference}");
+        // At this step alpha errs by 5e-4 (the readme's table), and so does each part of it along the ray, of which at most
+        // 1.5 lies in a shell that is 0.25 thick around a ball of radius 1: 2 * 5e-4 * 1.5 / 0.1.
+        assert!((shell - reference).abs() <= 0.015, "{shell} for {reference}");
     }
     assert!(compared > 5_000, "only {compared} pixels compared");
 }

@@ -99,6 +99,23 @@ fn a_tetrahedron_too_small_for_its_maps_is_left_out() {
     assert_eq!(drawn(shell), 4);
 }
 
+#[test]
+fn views_one_after_another_are_drawn_as_each_alone() {
+    let whole = view(DVec3::new(0.0, 0.0, 8.0), DVec3::ZERO, 24.0, 0.01, 96);
+    let corner = view(DVec3::new(0.0, 0.0, 8.0), DVec3::new(0.9, 0.9, 0.0), 2.0, 0.01, 96);
+    let mut behind = whole;
+    behind.camera.near = 8.5;
+    let scene = scene(ring(12), columns(&PAINTS), whole);
+    let mut method = Watched::prepare("shell", &scene);
+    let mut drawn = Vec::new();
+    for view in [corner, whole, behind, whole] {
+        let frame = method.render(&view);
+        assert_eq!(frame.image, Watched::prepare("shell", &scene).render(&view).image);
+        drawn.push(frame.report.counts["tetrahedra_drawn"]);
+    }
+    assert!(drawn[0] < drawn[1] && drawn[2] < drawn[1], "no buffer had to grow: {drawn:?}");
+}
+
 /// Two shells through one another, the second shifted by its own radius.
 fn overlapping() -> Mesh {
     let sphere = Generator::Sphere(Sphere { radius: 1.0, segments: 16, rings: 8 }).build().unwrap();

@@ -15,7 +15,8 @@ use crate::{Error, Result};
 #[derive(Debug)]
 pub struct Buffer {
     pub(super) raw: vk::Buffer,
-    pub(super) bytes: u64,
+    bytes: u64,
+    name: &'static str,
     allocation: ManuallyDrop<Allocation>,
     pub(super) gpu: Arc<Gpu>,
 }
@@ -38,7 +39,7 @@ impl Buffer {
         }
         let mut buffer =
             Self::new(gpu, name, bytes, vk::BufferUsageFlags::STORAGE_BUFFER, MemoryLocation::CpuToGpu)?;
-        buffer.write(data);
+        buffer.write_bytes(0, bytemuck::cast_slice(data));
         Ok(buffer)
     }
 
@@ -75,30 +76,31 @@ impl Buffer {
                 return Err(error);
             }
         };
-        let buffer = Self { raw, bytes, allocation: ManuallyDrop::new(allocation), gpu: gpu.clone() };
+        let buffer = Self { raw, bytes, name, allocation: ManuallyDrop::new(allocation), gpu: gpu.clone() };
         // SAFETY: the allocation meets the buffer's requirements and is bound once.
         unsafe { gpu.raw.bind_buffer_memory(raw, buffer.allocation.memory(), buffer.allocation.offset()) }
             .map_err(|error| vulkan_error(&format!("binding the memory of {name}"), error))?;
         Ok(buffer)
     }
 
-    /// Overwrites the first `data.len()` elements.
+    /// Overwrites the first `data.len()` elements of a buffer made by [`Buffer::storage`]; where they are more than it
+    /// holds, a new one takes its place.
     ///
-    /// # Panics
-    /// Where `data` is longer than the buffer.
-    pub fn write<T: bytemuck::NoUninit>(&mut self, data: &[T]) {
-        self.write_bytes(0, bytemuck::cast_slice(data));
+    /// # Errors
+    /// As [`Buffer::storage`].
+    pub fn refill<T: bytemuck::NoUninit>(&mut self, data: &[T]) -> Result<()> {
+        if size_of_val(data) as u64 > self.bytes {
+            *self = Self::storage(&self.gpu, self.name, data)?;
+        } else {
+            self.write_bytes(0, bytemuck::cast_slice(data));
+        }
+        Ok(())
     }
 
     /// Overwrites bytes from `start` on; panics where they do not fit.
     pub(super) fn write_bytes(&mut self, start: usize, bytes: &[u8]) {
         let mapped = self.allocation.mapped_slice_mut().expect("buffers are host-visible");
         mapped[start..start + bytes.len()].copy_from_slice(bytes);
-    }
-
-    /// How many elements of `T` fit.
-    pub fn capacity<T>(&self) -> usize {
-        usize::try_from(self.bytes).expect("mapped memory fits the address space") / size_of::<T>()
     }
 
     /// The buffer's contents.

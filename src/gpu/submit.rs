@@ -14,7 +14,7 @@ pub(super) fn submit(gpu: &Gpu, what: &str, record: impl FnOnce(vk::CommandBuffe
         .flags(vk::CommandPoolCreateFlags::TRANSIENT)
         .queue_family_index(gpu.queue_family);
     // SAFETY: the pool, its commands and the fence are of this device, used by this thread alone, and destroyed only once
-    // the submission is done or was never made.
+    // the submission is done, was never made, or cannot be waited for because the device is lost.
     unsafe {
         let pool = gpu.raw.create_command_pool(&pool_info, None).map_err(explain)?;
         let run = || -> std::result::Result<(), vk::Result> {

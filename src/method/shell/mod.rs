@@ -13,7 +13,7 @@ use std::sync::Arc;
 
 use bytemuck::{Pod, Zeroable};
 
-use self::seen::{Cell, Run, Seen, Tile};
+use self::seen::{Run, Seen};
 use super::{Method, Setup};
 use crate::Result;
 use crate::frame::{Frame, Image, Report, Stopwatch};
@@ -164,20 +164,14 @@ impl Method for Shell {
 }
 
 impl Shell {
-    /// The canvas for this frame, with what was seen in its buffers: the one of the frame before, where it fits.
+    /// The canvas for this frame, with what was seen in its buffers: the one of the frame before, where it is of that kind.
     fn canvas(&self, kept: Option<Canvas>, kind: CanvasKind, seen: &Seen) -> Result<Canvas> {
-        let fits = |canvas: &Canvas| {
-            canvas.kind == kind
-                && canvas.cells.capacity::<Cell>() >= seen.cells.len()
-                && canvas.tiles.capacity::<Tile>() >= seen.tiles.len()
-                && canvas.members.capacity::<u32>() >= seen.members.len()
-        };
-        let Some(mut canvas) = kept.filter(fits) else {
+        let Some(mut canvas) = kept.filter(|canvas| canvas.kind == kind) else {
             return self.new_canvas(kind, seen);
         };
-        canvas.cells.write(&seen.cells);
-        canvas.tiles.write(&seen.tiles);
-        canvas.members.write(&seen.members);
+        canvas.cells.refill(&seen.cells)?;
+        canvas.tiles.refill(&seen.tiles)?;
+        canvas.members.refill(&seen.members)?;
         Ok(canvas)
     }
 
