@@ -95,7 +95,7 @@ void main() {
                         walls++;
                         wall += texel.rgb;
                     } else if (texel.a > LEAST) {
-                        float one = extinction(texel) * step * per_depth;
+                        float one = extinction(texel) * max(step * per_depth, LEAST);
                         depth += one;
                         emission += emitted(texel, one);
                     }

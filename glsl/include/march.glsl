@@ -25,7 +25,7 @@ void march_midpoints(Path path, vec2 segment, float per_depth, uint count, inout
     for (uint i = 0; i < count; i++) {
         float z = segment.x + (float(i) + 0.5) * step;
         vec4 texel = fetch(path, z);
-        float optical = extinction(texel) * step * per_depth;
+        float optical = extinction(texel) * max(step * per_depth, LEAST);
         float alpha = opacity(optical);
         light.rgba += light.transmittance * vec4(emitted(texel, alpha), alpha);
         light.depth += light.transmittance * alpha * z;
@@ -123,7 +123,8 @@ void march_exactly(Path path, vec2 segment, float per_depth, inout Light light) 
     }
 }
 
+// A wall stops the ray however short the step: `LEAST` keeps infinity times nothing from being no number.
 void march(Path path, vec2 segment, float per_depth, inout Light light) {
-    if (PLAN == PLAN_EXACT) march_exactly(path, segment, per_depth, light);
+    if (PLAN == PLAN_EXACT) march_exactly(path, segment, max(per_depth, LEAST), light);
     else march_midpoints(path, segment, per_depth, sample_count(path, segment.x, segment.y), light);
 }
