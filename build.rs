@@ -75,7 +75,7 @@ fn compile_all(folder: &Path) -> Result<String, String> {
             .and_then(|()| {
                 writeln!(
                     rust,
-                    "pub const {}_{}: &[u32] = &{words:?};",
+                    "pub const {}_{}: Spirv = Spirv(&{words:?});",
                     name.to_uppercase(),
                     stage.to_uppercase()
                 )

@@ -9,6 +9,7 @@
 #include "medium.glsl"
 #include "ray.glsl"
 #include "sample.glsl"
+#include "march.glsl"
 
 layout(set = 0, binding = 0, std430) readonly buffer Cells { Cell cells[]; };
 layout(set = 0, binding = 2, std430) readonly buffer Members { uint list[]; };
@@ -84,23 +85,23 @@ void main() {
             for (uint i = 0; i < samples; i++) {
                 float at = z + (float(i) + 0.5) * step;
                 float depth = 0.0;
-                vec3 emitted = vec3(0.0); // sum of straight colour times optical depth
+                vec3 emission = vec3(0.0); // sum of straight colour times optical depth
                 uint walls = 0;
                 vec3 wall = vec3(0.0);
                 for (uint hit = first; hit < end; hit++) {
                     if (spans[hit].y <= z) continue;
                     vec4 texel = fetch(path_in(cells[hits[hit]].texture, ray), at);
-                    if (texel.a >= 1.0) {
+                    if (!EXTINCTION && texel.a >= 1.0) {
                         walls++;
                         wall += texel.rgb;
-                    } else if (texel.a > 0.0) {
-                        float one = optical_depth(texel.a) * step * per_depth;
+                    } else if (texel.a > LEAST) {
+                        float one = extinction(texel) * max(step * per_depth, LEAST);
                         depth += one;
-                        emitted += texel.rgb * (one / texel.a);
+                        emission += emitted(texel, one);
                     }
                 }
                 float alpha = walls > 0 ? 1.0 : opacity(depth);
-                vec3 colour = walls > 0 ? wall / float(walls) : depth > 0.0 ? emitted * (alpha / depth) : vec3(0.0);
+                vec3 colour = walls > 0 ? wall / float(walls) : depth > LEAST ? emission * (alpha / depth) : vec3(0.0);
                 rgba += transmittance * vec4(colour, alpha);
 #ifdef DEPTH
                 mean_distance += transmittance * alpha * at * length(ray);

@@ -11,6 +11,7 @@
 #include "medium.glsl"
 #include "ray.glsl"
 #include "sample.glsl"
+#include "march.glsl"
 
 layout(location = 0) flat in vec4 planes[4];
 layout(location = 4) flat in vec4 texture_rows[3];
@@ -25,29 +26,10 @@ void main() {
     vec2 segment = interval(planes, ray);
     if (!(segment.y > segment.x)) discard;
 
-    Path path = path_in(texture_rows, ray);
-    uint count = sample_count(path, segment.x, segment.y);
-    float step = (segment.y - segment.x) / float(count);
-    float depth_per_step = step * length(ray) * view.per_opacity_distance;
-
-    vec4 rgba = vec4(0.0);
-    float transmittance = 1.0;
-    float mean_distance = 0.0;
-    for (uint i = 0; i < count; i++) {
-        float z = segment.x + (float(i) + 0.5) * step;
-        vec4 texel = fetch(path, z);
-        float depth = optical_depth(texel.a) * depth_per_step;
-        float alpha = opacity(depth);
-        // Colour is premultiplied by the texture's alpha; what counts is this step's.
-        vec3 colour = texel.a > 0.0 ? texel.rgb * (alpha / texel.a) : vec3(0.0);
-        rgba += transmittance * vec4(colour, alpha);
+    Light light = Light(vec4(0.0), 1.0, 0.0);
+    march(path_in(texture_rows, ray), segment, length(ray) * view.per_opacity_distance, light);
+    out_rgba = light.rgba;
 #ifdef DEPTH
-        mean_distance += transmittance * alpha * z * length(ray);
-#endif
-        transmittance *= exp(-depth);
-    }
-    out_rgba = rgba;
-#ifdef DEPTH
-    out_depth = vec4(mean_distance, 0.0, 0.0, rgba.a);
+    out_depth = vec4(light.depth * length(ray), 0.0, 0.0, light.rgba.a);
 #endif
 }

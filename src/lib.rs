@@ -36,10 +36,12 @@ pub mod mesh;
 pub mod method;
 pub mod metric;
 pub mod order;
+mod output;
 pub mod progress;
 pub mod reference;
 pub mod scene;
 pub mod shell;
+pub mod value;
 pub mod volume;
 
 pub use error::{Error, Result};

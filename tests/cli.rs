@@ -209,7 +209,8 @@ fn bad_requests_are_told() {
     desk.refuses(&["render"], 2, &["<SCENE>"]);
     desk.refuses(&["render", "scene.toml", "--method", "magic"], 2, &["magic", "shell", "reference"]);
     desk.refuses(&["render", "scene.toml", "--size", "16"], 2, &["640x480"]);
-    desk.refuses(&["render", "scene.toml", "--size", "0x16"], 2, &["image.size", "1 to 32768"]);
+    desk.refuses(&["render", "scene.toml", "--size", "0x16"], 2, &["--size", "1 to 32768"]);
+    desk.refuses(&["render", "scene.toml", "--size", "32768x32768"], 2, &["--size", "2^28 pixels"]);
     desk.refuses(&["render", "scene.toml", "-D", "shell.thickness"], 2, &["-D shell.thickness", "`=`"]);
     desk.refuses(&["render", "scene.toml", "-D", "shell.thickness=0"], 2, &["-D shell.thickness=0"]);
     desk.refuses(&["render", "scene.toml", "-D", "shel.thickness=1"], 2, &["unknown key `shel`"]);

@@ -1,11 +1,15 @@
 //! What the device layer refuses, and that it refuses before it asks the driver: nothing here may make the validation
 //! layers speak.
 
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
 use mesoshell::Error;
 use mesoshell::gpu::{
-    DeviceChoice, Gpu, Messages, Pipeline, PipelineInfo, Target, Texture3d, devices, shaders,
+    Batch, Buffer, DeviceChoice, Draw, Gpu, Messages, Pipeline, PipelineInfo, Target, Texture3d, devices,
+    draw, shaders,
 };
-use mesoshell::volume::{Pyramid, Volume};
+use mesoshell::method::shell::ViewConstants;
+use mesoshell::volume::{Pyramid, Quantity, Volume};
 
 fn watched(test: impl FnOnce(&std::sync::Arc<Gpu>)) {
     let messages = Messages::default();
@@ -18,7 +22,7 @@ fn watched(test: impl FnOnce(&std::sync::Arc<Gpu>)) {
 
 fn empty(size: [u32; 3]) -> Pyramid {
     let texels = size.iter().map(|side| *side as usize).product();
-    Pyramid { levels: vec![Volume { size, texels: vec![[0.0; 4]; texels] }] }
+    Pyramid { levels: vec![Volume { size, texels: vec![[0.0; 4]; texels], quantity: Quantity::Opacity }] }
 }
 
 #[test]
@@ -59,6 +63,37 @@ fn a_picture_over_the_limit_is_refused() {
 }
 
 #[test]
+fn a_picture_without_pixels_is_refused() {
+    watched(|gpu| {
+        for [width, height] in [[0, 1], [1, 0]] {
+            let error = Target::new(gpu, width, height, 1).unwrap_err();
+            assert!(matches!(error, Error::Usage { .. }), "{error:?}");
+        }
+    });
+}
+
+#[test]
+fn a_pyramid_that_breaks_its_promises_reaches_no_device() {
+    watched(|gpu| {
+        let level = |size: [u32; 3], texels| Volume {
+            size,
+            texels: vec![[0.0; 4]; texels],
+            quantity: Quantity::Opacity,
+        };
+        for levels in [
+            vec![],
+            vec![level([4, 4, 4], 63)],
+            vec![level([0, 4, 4], 0)],
+            vec![level([4, 2, 2], 16), level([2, 2, 1], 4)],
+            vec![level([1, 1, 1], 1), level([1, 1, 1], 1)],
+        ] {
+            let upload = || Texture3d::upload(gpu, "the volume", &Pyramid { levels: levels.clone() });
+            assert!(catch_unwind(AssertUnwindSafe(upload)).is_err(), "{levels:?}");
+        }
+    });
+}
+
+#[test]
 fn a_picture_larger_than_memory_is_refused() {
     watched(|gpu| {
         let limit = gpu.info().max_image_2d;
@@ -73,8 +108,42 @@ fn a_picture_larger_than_memory_is_refused() {
 }
 
 #[test]
+fn a_draw_whose_parts_do_not_fit_reaches_no_device() {
+    watched(|gpu| {
+        let other = Gpu::open(&DeviceChoice::Any, None).unwrap();
+        let target = |gpu, attachments| Target::new(gpu, 4, 4, attachments).unwrap();
+        let info = PipelineInfo {
+            vertex: shaders::SHELL_VERT,
+            fragment: shaders::SHELL_FRAG,
+            constants: &[],
+            storage_buffers: 3,
+            textures: 1,
+            push_constant_bytes: size_of::<ViewConstants>() as u32,
+        };
+        let pipeline = Pipeline::new(gpu, &target(gpu, 1), &info).unwrap();
+        let buffer = |gpu| Buffer::storage(gpu, "nothing", &[0u32; 64]).unwrap();
+        let volume = Texture3d::upload(gpu, "the volume", &empty([1, 1, 1])).unwrap();
+        let draws = |target: &Target, buffers: &[&Buffer], bytes: usize| {
+            let batches = [Batch { pipeline: &pipeline, vertices: 0..0 }];
+            let push_constants = &vec![0; bytes];
+            let parts = Draw { target, buffers, textures: &[&volume], push_constants, batches: &batches };
+            catch_unwind(AssertUnwindSafe(|| draw(&parts).unwrap())).is_ok()
+        };
+        let (own, foreign) = (buffer(gpu), buffer(&other));
+        let bytes = size_of::<ViewConstants>();
+        assert!(draws(&target(gpu, 1), &[&own; 3], bytes));
+        assert!(!draws(&target(gpu, 2), &[&own; 3], bytes), "another number of attachments");
+        assert!(!draws(&target(gpu, 1), &[&own; 2], bytes), "a buffer is missing");
+        assert!(!draws(&target(gpu, 1), &[&own; 3], bytes - 4), "push constants are missing");
+        assert!(!draws(&target(&other, 1), &[&own; 3], bytes), "another device's target");
+        assert!(!draws(&target(gpu, 1), &[&own, &own, &foreign], bytes), "another device's buffer");
+    });
+}
+
+#[test]
 fn what_the_layers_say_is_heard() {
-    // The layers are really there: push constants that the shader reads and the pipeline does not have.
+    // The layers are really there: push constants that the shader reads and the pipeline does not have. (Nothing is drawn,
+    // and the bindings are right: a driver may crash at wrong ones while it compiles.)
     let messages = Messages::default();
     let gpu = Gpu::open(&DeviceChoice::Any, Some(&messages)).unwrap();
     let target = Target::new(&gpu, 4, 4, 1).unwrap();
@@ -82,7 +151,7 @@ fn what_the_layers_say_is_heard() {
         vertex: shaders::SHELL_VERT,
         fragment: shaders::SHELL_FRAG,
         constants: &[],
-        storage_buffers: 1,
+        storage_buffers: 3,
         textures: 1,
         push_constant_bytes: 4,
     };

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 use std::mem::offset_of;
 
-use mesoshell::gpu::shaders;
+use mesoshell::gpu::shaders::{self, Spirv};
 use mesoshell::method::shell::ViewConstants;
 use mesoshell::method::shell::seen::{Cell, Tile};
 use rspirv::binary::parse_words;
@@ -11,9 +11,9 @@ use rspirv::dr::{Instruction, Loader, Module, Operand};
 use rspirv::spirv::{Decoration, Op};
 
 /// Name and offset of each member of the struct type `name`, and the stride of arrays of it, if there are any.
-fn layout(words: &[u32], name: &str) -> (Vec<(String, u32)>, Option<u32>) {
+fn layout(shader: Spirv, name: &str) -> (Vec<(String, u32)>, Option<u32>) {
     let mut loader = Loader::new();
-    parse_words(words, &mut loader).expect("glslang wrote it");
+    parse_words(shader.words(), &mut loader).expect("glslang wrote it");
     let module: Module = loader.module();
     let id_of = |operand: &Operand| operand.unwrap_id_ref();
     let id = module
@@ -76,10 +76,10 @@ macro_rules! host {
 fn shell_structs_agree() {
     let constants = host!(ViewConstants: centre, pixel, near, texels, last_level, lod_scale, per_opacity_distance, step, samples);
     // The vertex shader reads no constants, but the fragment shaders do.
-    for words in
+    for shader in
         [shaders::SHELL_FRAG, shaders::SHELL_DEPTH_FRAG, shaders::CYCLE_FRAG, shaders::CYCLE_DEPTH_FRAG]
     {
-        assert_eq!(layout(words, "View").0, constants);
+        assert_eq!(layout(shader, "View").0, constants);
     }
     let (members, stride) = layout(shaders::SHELL_VERT, "Cell");
     assert_eq!(members, host!(Cell: outline, planes, texture));

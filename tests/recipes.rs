@@ -191,10 +191,14 @@ fn mistakes_are_underlined() {
     assert_underlined(&format!("{fur}length = "), "\"long\"", "", "`length`: invalid type");
     assert_underlined(&format!("{fur}density = "), "-4", "", "`density`: invalid value");
     assert_underlined(&format!("{fur}density = "), "1.5", "", "`density`");
-    assert_underlined(&format!("{fur}tip_colour = "), "\"gold\"", "", "`tip_colour`: `gold` is not a colour");
+    assert_underlined(&format!("{fur}tip_colour = "), "\"gold\"", "", "`tip_colour`: invalid value");
+    assert_underlined(&format!("{fur}tip_colour = [1, "), "-1", ", 0]", "`tip_colour`: invalid value");
+    assert_underlined(&format!("{fur}tip_colour = "), "[1, 0, 0, 1]", "", "`tip_colour`: invalid length");
     assert_underlined(&format!("{fur}height = "), "9", "", "`height`");
     assert_underlined("recipe = ", "\"grass\"", "", "there is no recipe \"grass\"");
-    assert_underlined("recipe = \"fog\"\nsize = ", "[1, 2]", "", "`size`");
+    for size in ["[1, 2]", "[1, 2, 3, 4]"] {
+        assert_underlined("recipe = \"fog\"\nsize = ", size, "", "expected a list of 3");
+    }
     assert_underlined("recipe = \"fog\"\nseed = ", "-1", "", "`seed`");
     assert_underlined("", "", "seed = 1", "`recipe`");
 }

@@ -38,7 +38,7 @@ fn layers(layers: &[[f32; 4]]) -> Volume {
     Volume::new([1, 1, layers.len() as u32], layers.to_vec()).unwrap()
 }
 
-fn gray(alpha: f32) -> [f32; 4] {
+fn grey(alpha: f32) -> [f32; 4] {
     [alpha, 0.5 * alpha, 0.0, alpha]
 }
 
@@ -52,8 +52,8 @@ fn bright_noise(size: [u32; 3], most: f32, gain: f32) -> Volume {
     let mut random = Pcg32::seed_from_u64(7);
     let texel = |_| {
         let alpha = (random.random_range(-0.33..1.33_f32)).clamp(0.0, 1.0) * most;
-        let mut color = || random.random_range(0.0..=gain) * alpha;
-        [color(), color(), color(), alpha]
+        let mut colour = || random.random_range(0.0..=gain) * alpha;
+        [colour(), colour(), colour(), alpha]
     };
     Volume::new(size, (0..size.iter().product()).map(texel).collect()).unwrap()
 }
@@ -117,7 +117,7 @@ fn mean_extinction(from: f64, to: f64) -> f64 {
 fn a_constant_medium_in_a_flat_shell() {
     let alpha = 0.3_f32;
     let view = slanted_view();
-    for (slant, sample) in through_flat(layers(&[gray(alpha); 3]), &view) {
+    for (slant, sample) in through_flat(layers(&[grey(alpha); 3]), &view) {
         let sigma = -(1.0 - f64::from(alpha)).ln() / OPACITY_DISTANCE;
         let length = THICKNESS * slant;
         let total = 1.0 - (-sigma * length).exp();
@@ -160,7 +160,7 @@ fn a_constant_medium_in_bent_shells_seen_from_outside_and_inside() {
     {
         for eye in [DVec3::new(0.4, 1.9, 2.9), inside, DVec3::new(0.02, 0.01, 0.03)] {
             let view = view(eye, DVec3::new(0.1, 0.05, -0.2), 12);
-            let scene = scene(shell.clone(), level_zero(layers(&[gray(alpha)])), view);
+            let scene = scene(shell.clone(), level_zero(layers(&[grey(alpha)])), view);
             let reference = Reference::new(&scene, &view);
             let mut hits = 0;
             for (point, direction) in rays(&view) {
@@ -178,7 +178,7 @@ fn a_constant_medium_in_bent_shells_seen_from_outside_and_inside() {
 #[test]
 fn a_linear_density() {
     let (low, high) = (0.15_f32, 0.85_f32);
-    for (slant, sample) in through_flat(layers(&[gray(low), gray(high)]), &slanted_view()) {
+    for (slant, sample) in through_flat(layers(&[grey(low), grey(high)]), &slanted_view()) {
         let [low, high] = [low, high].map(|alpha| 1.0 - f64::from(alpha));
         // A quarter of the thickness is clamped at either end; half of it is the ramp.
         let mean = 0.25 * -(low.ln() + high.ln()) + 0.5 * mean_extinction(low, high);
@@ -203,7 +203,7 @@ fn a_linear_colour_in_a_constant_medium() {
 #[test]
 fn one_opaque_plane_of_texels_is_a_singularity_and_not_a_wall() {
     let (below, above) = (0.25_f32, 0.5_f32);
-    for (slant, sample) in through_flat(layers(&[gray(below), gray(1.0), gray(above)]), &slanted_view()) {
+    for (slant, sample) in through_flat(layers(&[grey(below), grey(1.0), grey(above)]), &slanted_view()) {
         let [below, above] = [below, above].map(|alpha| 1.0 - f64::from(alpha));
         let mean =
             -(below.ln() + above.ln()) + 2.0 * (mean_extinction(below, 0.0) + mean_extinction(0.0, above));
@@ -266,7 +266,7 @@ fn empty_space_is_exactly_nothing_and_costs_nothing() {
 fn levels_of_detail_are_blended_along_the_ray() {
     let [fine, coarse] = [0.3_f32, 0.6];
     let level = |size: [u32; 3], alpha| {
-        Volume::new(size, vec![gray(alpha); size.iter().product::<u32>() as usize]).unwrap()
+        Volume::new(size, vec![grey(alpha); size.iter().product::<u32>() as usize]).unwrap()
     };
     // Constant levels: only the level of detail varies, with depth. It goes from below 0 to above the last.
     let volume = Pyramid { levels: vec![level([8, 8, 8], fine), level([4, 4, 4], coarse)] };
@@ -316,7 +316,7 @@ fn the_near_plane_is_a_depth_and_not_a_distance() {
     let alpha = 0.3_f32;
     let mut view = view(DVec3::new(0.0, 0.4, 0.1), DVec3::new(0.1, 0.0, 0.0), 7);
     view.camera.near = 0.1;
-    for (i, (slant, sample)) in through_flat(layers(&[gray(alpha)]), &view).into_iter().enumerate() {
+    for (i, (slant, sample)) in through_flat(layers(&[grey(alpha)]), &view).into_iter().enumerate() {
         let direction = rays(&view)[i].1;
         let length = view.camera.eye.y * slant - view.camera.near * direction.length();
         let total = 1.0 - (1.0 - f64::from(alpha)).powf(length / OPACITY_DISTANCE);
@@ -332,7 +332,7 @@ fn rays_in_shared_faces_and_along_edges_count_once() {
         for eye in [DVec3::new(0.0, 2.0, 0.0), DVec3::new(SIDE / 6.0, 1.7, -SIDE / 6.0)] {
             let mut view = view(eye, DVec3::new(eye.x, 0.0, eye.z), 9);
             view.camera.up = DVec3::new(turn.sin(), 0.0, turn.cos());
-            let scene = scene(flat_shell(), level_zero(layers(&[gray(0.5)])), view);
+            let scene = scene(flat_shell(), level_zero(layers(&[grey(0.5)])), view);
             let reference = Reference::new(&scene, &view);
             for (point, direction) in rays(&view) {
                 assert_close(reference.path_length(point), THICKNESS * slant(direction), 1e-12);
@@ -348,7 +348,7 @@ fn inverted_cells_are_solids_too() {
     let shell = Shell::build(&mesh, &ShellOptions::new(THICKNESS)).unwrap();
     assert_eq!(shell.health.inverted, shell.health.tetrahedra);
     let view = slanted_view();
-    let volume = layers(&[gray(0.2), gray(0.7)]);
+    let volume = layers(&[grey(0.2), grey(0.7)]);
     let scene = scene(shell, level_zero(volume.clone()), view);
     let reference = Reference::new(&scene, &view);
     // The same medium upside down: a different path through it, of the same optical depth.
@@ -366,7 +366,7 @@ fn cells_without_volume_add_nothing() {
     let shell = Shell::build(&mesh, &options).unwrap();
     assert!(shell.health.zero_volume > 36);
     let view = view(DVec3::new(0.0, 3.0, 0.0), DVec3::ZERO, 12);
-    let scene = scene(shell, level_zero(layers(&[gray(0.5)])), view);
+    let scene = scene(shell, level_zero(layers(&[grey(0.5)])), view);
     let reference = Reference::new(&scene, &view);
     let ground = |direction: DVec3| view.camera.eye - direction * (view.camera.eye.y / direction.y);
     let (mut empty, mut full) = (0, 0);
@@ -400,7 +400,7 @@ fn media_that_overlap_add() {
     mesh.uvs.extend(&low.uvs);
     let shell = Shell::build(&mesh, &ShellOptions::new(THICKNESS)).unwrap();
     let view = slanted_view();
-    let mut scene = scene(shell, level_zero(layers(&[gray(0.4)])), view);
+    let mut scene = scene(shell, level_zero(layers(&[grey(0.4)])), view);
     let reference = Reference::new(&scene, &view);
     for (point, direction) in rays(&view) {
         let length = 2.0 * THICKNESS * slant(direction);
@@ -410,7 +410,7 @@ fn media_that_overlap_add() {
         assert_close(reference.integrate_ray(point).rgba[3], total, TOLERANCE + f64::from(f32::EPSILON));
     }
     // Walls hide across media: the upper shell is opaque from its upper texel down, and comes first.
-    scene.volume = level_zero(layers(&[gray(0.4), gray(1.0)]));
+    scene.volume = level_zero(layers(&[grey(0.4), grey(1.0)]));
     let reference = Reference::new(&scene, &view);
     assert_eq!(reference.pixel(4, 4).rgba, [1.0, 0.5, 0.0, 1.0]);
 }
@@ -442,7 +442,7 @@ fn brute_force(scene: &Scene, view: &View, direction: DVec3, range: [f64; 2], st
     let shell = &scene.shell;
     let size = scene.volume.levels[0].size.map(f64::from);
     let pixel = view.pixel_at_unit_depth();
-    let (mut color, mut depth) = ([0.0; 4], 0.0_f64);
+    let (mut colour, mut depth) = ([0.0; 4], 0.0_f64);
     let dz = (range[1] - range[0]) / f64::from(steps);
     let ds = dz * direction.length() / scene.medium.opacity_distance;
     let mut candidates: Vec<usize> = (0..shell.cells.len()).collect();
@@ -475,14 +475,14 @@ fn brute_force(scene: &Scene, view: &View, direction: DVec3, range: [f64; 2], st
             let step = -(-a).ln_1p() * ds;
             if a > 0.0 {
                 let seen = (-depth).exp() * -(-step).exp_m1();
-                for (sum, premultiplied) in color.iter_mut().zip([r, g, b, a]) {
+                for (sum, premultiplied) in colour.iter_mut().zip([r, g, b, a]) {
                     *sum += seen * premultiplied / a;
                 }
             }
             depth += step;
         }
     }
-    color
+    colour
 }
 
 #[test]
@@ -521,7 +521,7 @@ fn brute_force_agrees_on_noise_in_a_flat_shell() {
         let run = |steps: u32| {
             let length = THICKNESS * slant(direction);
             let ds = length / f64::from(steps);
-            let (mut color, mut depth) = ([0.0; 4], 0.0_f64);
+            let (mut colour, mut depth) = ([0.0; 4], 0.0_f64);
             for i in 0..steps {
                 let y = THICKNESS * (1.0 - (f64::from(i) + 0.5) / f64::from(steps));
                 let p = view.camera.eye + direction * ((y - view.camera.eye.y) / direction.y);
@@ -530,13 +530,13 @@ fn brute_force_agrees_on_noise_in_a_flat_shell() {
                 let step = -(-a).ln_1p() * ds / OPACITY_DISTANCE;
                 let seen = (-depth).exp() * -(-step).exp_m1();
                 if a > 0.0 {
-                    for (sum, premultiplied) in color.iter_mut().zip([r, g, b, a]) {
+                    for (sum, premultiplied) in colour.iter_mut().zip([r, g, b, a]) {
                         *sum += seen * premultiplied / a;
                     }
                 }
                 depth += step;
             }
-            color
+            colour
         };
         // The midpoint rule is of second order, across the kinks at texel planes too: the error of the finer
         // run is a third of the difference; kinks fall anywhere in a step, which triples it at most.
@@ -656,7 +656,7 @@ fn threads_do_not_matter_and_the_frame_is_what_pixels_say() {
 #[test]
 fn an_interrupt_is_heard() {
     let view = slanted_view();
-    let scene = scene(flat_shell(), level_zero(layers(&[gray(0.5)])), view);
+    let scene = scene(flat_shell(), level_zero(layers(&[grey(0.5)])), view);
     let interrupt = Interrupt::default();
     interrupt.set();
     assert!(matches!(render(&scene, &view, &Silent, &interrupt), Err(Error::Interrupted)));

@@ -5,6 +5,7 @@ use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 use mesoshell::Error;
+use mesoshell::value::Colour;
 use mesoshell::volume::{
     AlphaMode, ControlPoint, Interpretation, RawVolume, Sample, TransferFunction, Volume, info, read,
     write_raw, write_volume,
@@ -261,7 +262,7 @@ fn what_a_file_holds_becomes_a_medium() {
     let raw = read(&path).unwrap();
     let message = refusal(&path, Volume::from_raw(raw.clone(), &Interpretation::default()));
     assert!(message.contains("colour and opacity"), "{message}");
-    let point = |value, alpha| ControlPoint { value, colour: [1.0, 0.0, 0.0], alpha };
+    let point = |value, alpha| ControlPoint { value, colour: Colour::linear(1.0, 0.0, 0.0), alpha };
     let transfer = TransferFunction::new(vec![point(0.0, 0.0), point(8.0, 1.0)]).unwrap();
     let interpretation = Interpretation { transfer: Some(transfer), ..Default::default() };
     let volume = Volume::from_raw(raw, &interpretation).unwrap();

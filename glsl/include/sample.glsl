@@ -1,7 +1,9 @@
 // Reads the volume along a ray in one tetrahedron, at the level of detail of the pixel's footprint.
 
-layout(constant_id = 0) const bool PAPER_PLAN = false;
+layout(constant_id = 0) const uint PLAN = 0; // see march.glsl
 layout(constant_id = 1) const bool MINIFIED = true; // whether any level but 0 can be needed
+
+layout(constant_id = 2) const bool EXTINCTION = false; // what the fourth channel holds; else opacity
 
 layout(set = 0, binding = 3) uniform sampler3D volume; // premultiplied
 
@@ -36,8 +38,13 @@ vec4 fetch(Path path, float depth) {
 
 // How many samples the plan gives to a segment.
 uint sample_count(Path path, float entry, float exit) {
-    if (PAPER_PLAN) return view.samples;
+    if (PLAN == 1) return view.samples;
     float texel = MINIFIED ? exp2(floor(level_of_detail(path, 0.5 * (entry + exit)))) : 1.0;
     float texels = length(path.from_depth * view.texels) * (exit - entry) / texel;
     return uint(clamp(ceil(texels / view.step), 1.0, 65536.0));
+}
+
+// Optical depth of a path of one opacity distance through this texel.
+float extinction(vec4 texel) {
+    return EXTINCTION ? texel.a : optical_depth(texel.a);
 }

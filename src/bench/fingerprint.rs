@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::reference::TOLERANCE;
 use crate::scene::{Medium, Scene, View};
+use crate::volume::Quantity;
 
 /// The code that a cached reference comes from: were it changed, so might its pictures be.
 const REFERENCE_CODE: [(&str, &str); 5] = [
@@ -78,7 +79,11 @@ impl Fingerprint {
             builder = builder.numbers(&cell.gradients).numbers(&[cell.texture_from_world]);
         }
         for level in &scene.volume.levels {
-            builder = builder.numbers(&level.size).numbers(&level.texels);
+            let quantity = match level.quantity {
+                Quantity::Opacity => "opacity",
+                Quantity::Extinction => "extinction",
+            };
+            builder = builder.bytes(quantity.as_bytes()).numbers(&level.size).numbers(&level.texels);
         }
         builder.finish()
     }
@@ -112,6 +117,7 @@ pub(crate) mod tests {
         ("a texel of the first level", |scene| scene.volume.levels[0].texels[6][1] += 1e-6),
         ("a texel of the last level", |scene| scene.volume.levels[1].texels[0][3] += 1e-6),
         ("the shape of a level", |scene| scene.volume.levels[0].size = [1, 2, 4]),
+        ("what alpha is", |scene| scene.volume.levels[0].quantity = Quantity::Extinction),
         ("the opacity distance", |scene| scene.medium.opacity_distance *= 2.0),
         ("the level of detail", |scene| scene.medium.lod_footprint = 0.0),
         ("the eye", |scene| scene.view.camera.eye.x += 1e-9),

@@ -9,8 +9,8 @@ use toml::Spanned;
 use super::fingerprint::Fingerprint;
 use crate::method::{self, METHODS};
 use crate::scene::March;
-use crate::scene::number::{PictureSize, Runs, Samples, Step};
 use crate::scene::text::Text;
+use crate::value::{PictureSize, Runs, Samples, Step};
 use crate::{Error, Result};
 
 /// What is measured.
@@ -47,12 +47,14 @@ pub struct Levels {
     pub steps: Vec<f64>,
     /// [`March::Paper`]: samples in each tetrahedron.
     pub samples: Vec<u32>,
+    /// Whether [`March::Exact`], which has no levels, is measured too.
+    pub exact: bool,
 }
 
 impl Default for Levels {
-    /// Five steps, each half of the one before; the paper's plan is left out.
+    /// Five steps, each half of the one before; the other plans are left out.
     fn default() -> Self {
-        Self { steps: vec![2.0, 1.0, 0.5, 0.25, 0.125], samples: Vec::new() }
+        Self { steps: vec![2.0, 1.0, 0.5, 0.25, 0.125], samples: Vec::new(), exact: false }
     }
 }
 
@@ -71,8 +73,8 @@ impl Levels {
                 "{samples} samples are impossible, expected a whole number from 1 to 4096"
             ));
         }
-        if self.steps.is_empty() && self.samples.is_empty() {
-            return usage("there is nothing to measure: neither steps nor samples are given".to_owned());
+        if self.steps.is_empty() && self.samples.is_empty() && !self.exact {
+            return usage("there is nothing to measure: no level of any plan is given".to_owned());
         }
         Ok(())
     }
@@ -84,6 +86,7 @@ impl Setting {
         match self.march {
             March::Default { .. } => "default",
             March::Paper { .. } => "paper",
+            March::Exact => "exact",
         }
     }
 
@@ -93,15 +96,17 @@ impl Setting {
             March::Default { step } => format!("step {step}"),
             March::Paper { samples: 1 } => "1 sample".to_owned(),
             March::Paper { samples } => format!("{samples} samples"),
+            March::Exact => "exact".to_owned(),
         }
     }
 
     /// The distance between samples in the plan's own unit, a texel or a ray's part in a tetrahedron: the error falls
-    /// with a power of it.
+    /// with a power of it. It is 1 for a plan without levels.
     pub fn spacing(&self) -> f64 {
         match self.march {
             March::Default { step } => step,
             March::Paper { samples } => 1.0 / f64::from(samples),
+            March::Exact => 1.0,
         }
     }
 
@@ -133,6 +138,8 @@ struct Plans {
     default: Vec<Step>,
     #[serde(default)]
     paper: Vec<Samples>,
+    #[serde(default)]
+    exact: bool,
 }
 
 fn five_runs() -> Runs {
@@ -177,10 +184,11 @@ impl Sweep {
         let levels = Levels {
             steps: file.plans.get_ref().default.iter().map(|step| step.0).collect(),
             samples: file.plans.get_ref().paper.iter().map(|samples| samples.0).collect(),
+            exact: file.plans.get_ref().exact,
         };
-        if levels.steps.is_empty() && levels.samples.is_empty() {
+        if levels.steps.is_empty() && levels.samples.is_empty() && !levels.exact {
             let message =
-                "[plans] is empty, expected a list of steps under `default` or of samples under `paper`";
+                "[plans] is empty, expected steps under `default`, samples under `paper`, or `exact = true`";
             return Err(text.error(file.plans.span(), message));
         }
         let methods: Vec<&str> = match &file.methods {
@@ -224,7 +232,7 @@ pub fn looks_like_sweep(text: &str) -> bool {
 fn settings(methods: &[&str], levels: &Levels) -> Vec<Setting> {
     let steps = levels.steps.iter().map(|&step| March::Default { step });
     let samples = levels.samples.iter().map(|&samples| March::Paper { samples });
-    let marches: Vec<March> = steps.chain(samples).collect();
+    let marches: Vec<March> = steps.chain(samples).chain(levels.exact.then_some(March::Exact)).collect();
     let of_method = |method| marches.iter().map(move |&march| (method, march));
     let pairs = methods.iter().flat_map(of_method);
     pairs.map(|(&method, march)| Setting { method: method.to_owned(), march }).collect()
@@ -256,6 +264,7 @@ define = ['shell.thickness=0.1']
 [plans]
 default = [1, 0.5]
 paper = [4]
+exact = true
 ";
 
     fn parse(text: &str) -> Result<Sweep> {
@@ -267,9 +276,9 @@ paper = [4]
         let sweep = parse(SWEEP).unwrap();
         assert_eq!(sweep.scenes, [Path::new("benches/a.toml"), Path::new("benches/../b.toml")]);
         assert_eq!((sweep.size, sweep.runs), (Some([64, 32]), 2));
-        let expected =
-            [March::Default { step: 1.0 }, March::Default { step: 0.5 }, March::Paper { samples: 4 }]
-                .map(|march| Setting { method: "shell".to_owned(), march });
+        let marches =
+            [March::Default { step: 1.0 }, March::Default { step: 0.5 }, March::Paper { samples: 4 }, March::Exact];
+        let expected = marches.map(|march| Setting { method: "shell".to_owned(), march });
         assert_eq!(sweep.settings, expected);
     }
 
@@ -297,7 +306,7 @@ paper = [4]
         ["paper = [4]", "papers = [4]", "papers", "unknown key `papers`"],
         ["[4]", "[4, 0]", "0", "from 1 to 4096"],
         ["0.5]", "-0.5]", "-0.5", "from 0.001"],
-        ["default = [1, 0.5]\npaper = [4]", "", "[plans]", "a list of steps"],
+        ["default = [1, 0.5]\npaper = [4]\nexact = true", "exact = false", "[plans]", "steps under"],
         ["[plans]", "[plans", "", "unclosed table"],
     ];
 
@@ -336,7 +345,7 @@ paper = [4]
     fn the_default_sweep_is_one() {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("benches/default.toml");
         let sweep = Sweep::load(&path).unwrap();
-        assert_eq!((sweep.scenes.len(), sweep.settings.len()), (3, 10));
+        assert_eq!((sweep.scenes.len(), sweep.settings.len()), (3, 11));
         assert!(sweep.scenes.iter().all(|scene| scene.is_file()));
     }
 }

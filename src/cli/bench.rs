@@ -28,6 +28,9 @@ pub struct Arguments {
     /// Samples in a tetrahedron by the paper's plan, for scene files: by default none
     #[arg(long, value_delimiter = ',', value_name = "LIST")]
     samples: Option<Vec<u32>>,
+    /// Measure the exact plan too, for scene files
+    #[arg(long)]
+    exact: bool,
     /// Frames timed a point; by default as the sweep says, or 3
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=1000))]
     runs: Option<u32>,
@@ -78,7 +81,7 @@ fn what(arguments: &Arguments) -> Result<Sweep> {
         |message: &str, help: &str| Error::Usage { message: message.to_owned(), help: Some(help.to_owned()) };
     let is_sweep =
         |path: &Path| std::fs::read_to_string(path).is_ok_and(|text| sweep::looks_like_sweep(&text));
-    let levels_given = arguments.steps.is_some() || arguments.samples.is_some();
+    let levels_given = arguments.steps.is_some() || arguments.samples.is_some() || arguments.exact;
     let mut sweep = match arguments.files.as_slice() {
         [file] if is_sweep(file) => {
             if levels_given {
@@ -106,7 +109,7 @@ fn levels(arguments: &Arguments) -> Result<Levels> {
         None => Levels::default().steps,
     });
     let samples = arguments.samples.clone().unwrap_or_default();
-    let levels = Levels { steps, samples };
+    let levels = Levels { steps, samples, exact: arguments.exact };
     levels.check().map(|()| levels)
 }
 

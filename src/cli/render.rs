@@ -10,6 +10,7 @@ use mesoshell::gpu::{DeviceChoice, Messages};
 use mesoshell::method::{self, METHODS, Setup};
 use mesoshell::progress::{Interrupt, Progress};
 use mesoshell::scene::{self, Loaded, View};
+use mesoshell::value::PictureSize;
 use mesoshell::{Error, Result};
 use serde::Serialize;
 
@@ -27,7 +28,7 @@ pub struct Arguments {
     output: Option<PathBuf>,
     /// Width and height in pixels, instead of the scene's
     #[arg(long, value_name = "WxH", value_parser = size)]
-    size: Option<[u32; 2]>,
+    size: Option<PictureSize>,
     /// How the scene is rendered
     #[arg(long, default_value = METHODS[0].name, value_parser = methods())]
     method: String,
@@ -82,9 +83,11 @@ fn render(arguments: &Arguments, progress: &Arc<dyn Progress>, interrupt: &Inter
     });
     file::check_writable(&output)?;
 
-    let mut overrides = arguments.define.clone();
-    overrides.extend(arguments.size.map(|[width, height]| format!("image.size=[{width}, {height}]")));
-    let Loaded { scene: loaded, background, mut stages } = scene::load(scene, &overrides, progress.as_ref())?;
+    let Loaded { scene: mut loaded, background, mut stages } =
+        scene::load(scene, &arguments.define, progress.as_ref())?;
+    if let Some(PictureSize(size)) = arguments.size {
+        [loaded.view.width, loaded.view.height] = size.map(|side| side.0);
+    }
     interrupt.check()?;
 
     let view = loaded.view;
@@ -122,8 +125,8 @@ fn methods() -> PossibleValuesParser {
     METHODS.iter().map(|entry| PossibleValue::new(entry.name).help(entry.summary)).collect::<Vec<_>>().into()
 }
 
-fn size(text: &str) -> std::result::Result<[u32; 2], String> {
+fn size(text: &str) -> std::result::Result<PictureSize, String> {
     let (width, height) = text.split_once(['x', 'X']).ok_or("write it as 640x480")?;
-    let pixels = |side: &str| side.parse().map_err(|_| format!("`{side}` is no number of pixels"));
-    Ok([pixels(width)?, pixels(height)?])
+    let pixels = |side: &str| side.parse::<u32>().map_err(|_| format!("`{side}` is no number of pixels"));
+    PictureSize::new(pixels(width)?, pixels(height)?)
 }

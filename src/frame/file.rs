@@ -14,7 +14,8 @@ use image::codecs::png::{PngDecoder, PngEncoder};
 use image::{DynamicImage, ExtendedColorType, ImageDecoder, ImageEncoder, ImageError, Limits};
 
 use super::Image;
-use crate::{Error, Result};
+use super::srgb::{linear_from_srgb, srgb_from_linear};
+use crate::{Error, Result, output};
 
 /// The most pixels that are read: 4 GiB of f32 RGBA.
 const MOST_PIXELS: u64 = 1 << 28;
@@ -50,7 +51,7 @@ impl Format {
 pub fn check_writable(path: impl AsRef<Path>) -> Result<()> {
     let path = path.as_ref();
     Format::of(path)?;
-    file_beside(path).map(drop)
+    output::file_beside(path).map(drop)
 }
 
 /// Writes an image as the file's extension says, in place of any file of that name.
@@ -65,7 +66,7 @@ pub fn check_writable(path: impl AsRef<Path>) -> Result<()> {
 pub fn write(path: impl AsRef<Path>, image: &Image, background: Option<[f32; 3]>) -> Result<()> {
     let path = path.as_ref();
     let format = Format::of(path)?;
-    let mut file = file_beside(path)?;
+    let mut file = output::file_beside(path)?;
     let mut writer = BufWriter::new(file.as_file_mut());
     let encoded = match format {
         Format::Png => {
@@ -73,15 +74,14 @@ pub fn write(path: impl AsRef<Path>, image: &Image, background: Option<[f32; 3]>
             write_png(&mut writer, image, background)
         }
         Format::Exr => {
-            let (bytes, color) = (bytemuck::cast_slice(&image.rgba), ExtendedColorType::Rgba32F);
-            OpenExrEncoder::new(&mut writer).write_image(bytes, image.width, image.height, color)
+            let (bytes, kind) = (bytemuck::cast_slice(&image.rgba), ExtendedColorType::Rgba32F);
+            OpenExrEncoder::new(&mut writer).write_image(bytes, image.width, image.height, kind)
         }
     };
-    encoded.map_err(|error| output(path, format!("cannot be encoded: {error}")))?;
-    writer.flush().map_err(|error| output(path, format!("cannot be written: {error}")))?;
+    encoded.map_err(|error| output::error(path, format!("cannot be encoded: {error}")))?;
+    writer.flush().map_err(|error| output::unwritable(path, &error))?;
     drop(writer);
-    file.persist(path).map_err(|error| output(path, format!("cannot be written: {}", error.error)))?;
-    Ok(())
+    output::keep(file, path)
 }
 
 /// Reads an image: EXR as linear premultiplied RGBA, PNG as sRGB (whatever profile it names) with straight
@@ -128,58 +128,12 @@ pub fn read(path: impl AsRef<Path>) -> Result<Image> {
     }
 }
 
-/// The linear value, 0..=1, of an sRGB value, 0..=1 (IEC 61966-2-1).
-pub fn linear_from_srgb(encoded: f32) -> f32 {
-    if encoded <= 0.04045 { encoded / 12.92 } else { ((encoded + 0.055) / 1.055).powf(2.4) }
-}
-
-/// The sRGB value, 0..=1, of a linear value, 0..=1 (IEC 61966-2-1).
-pub fn srgb_from_linear(linear: f32) -> f32 {
-    if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 }
-}
-
-fn output(path: &Path, message: String) -> Error {
-    Error::Output { path: path.to_owned(), message, help: None }
-}
-
-/// An unnamed-to-be file in the directory of `path`, deleted unless it is renamed.
-pub(crate) fn file_beside(path: &Path) -> Result<tempfile::NamedTempFile> {
-    // A rename would put a file in place of a device such as /dev/null.
-    if path.exists() && !path.is_file() {
-        return Err(output(path, "is there already, and is not a file".into())
-            .with_help("name a file that may be replaced, or a new one"));
-    }
-    let directory = path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(".mesoshell-");
-    #[cfg(unix)]
-    {
-        // As any other new file, not private as temporary files are by default; the umask still applies.
-        use std::os::unix::fs::PermissionsExt;
-        builder.permissions(std::fs::Permissions::from_mode(0o666));
-    }
-    builder.tempfile_in(directory).map_err(|error| {
-        let help = if directory.is_dir() {
-            "check the directory's permissions and the space on its disk"
-        } else {
-            "make the directory first"
-        };
-        output(path, format!("no file can be made in {}: {}", directory.display(), io_reason(&error)))
-            .with_help(help)
-    })
-}
-
-/// The system's own words, without the temporary file's name.
-fn io_reason(error: &std::io::Error) -> std::io::Error {
-    error.kind().into()
-}
-
 fn check_numbers(path: &Path, image: &Image) -> Result<()> {
     match image.rgba.iter().position(|pixel| pixel.iter().any(|x| x.is_nan())) {
         None => Ok(()),
         Some(index) => {
             let (x, y) = (index % image.width as usize, index / image.width as usize);
-            Err(output(path, format!("pixel ({x}, {y}) is not a number, and a PNG cannot say so"))
+            Err(output::error(path, format!("pixel ({x}, {y}) is not a number, and a PNG cannot say so"))
                 .with_help("write an EXR to see what is there"))
         }
     }
@@ -318,16 +272,6 @@ mod tests {
         // What has been rounded once stays.
         let again = written(&folder, "b.png", &back, None);
         assert!(std::fs::read(path).unwrap() == std::fs::read(again).unwrap());
-    }
-
-    #[test]
-    fn srgb_is_its_own_inverse() {
-        for byte in 0..=255_u8 {
-            let encoded = f32::from(byte) / 255.0;
-            assert!((srgb_from_linear(linear_from_srgb(encoded)) - encoded).abs() < 1e-6);
-        }
-        // The pieces meet: their ends differ by the rounding of the standard's constants.
-        assert!((linear_from_srgb(0.04045_f32.next_up()) - linear_from_srgb(0.04045)).abs() < 1e-7);
     }
 
     #[test]

@@ -3,6 +3,7 @@
 pub mod file;
 pub mod image;
 pub mod report;
+pub mod srgb;
 
 pub use image::Image;
 pub use report::{Report, Stage, Stopwatch};

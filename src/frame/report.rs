@@ -19,7 +19,7 @@ pub struct Stage {
 pub struct Report {
     /// The method's name.
     pub method: String,
-    /// The device and driver, or `"cpu"`.
+    /// The device's name, or `"cpu"`.
     pub device: String,
     /// In the order in which they ran.
     pub stages: Vec<Stage>,

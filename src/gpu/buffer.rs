@@ -1,23 +1,24 @@
 //! Buffers that the host writes or reads and the device reads or writes.
 
 use std::mem::ManuallyDrop;
-use std::sync::{Arc, PoisonError};
+use std::sync::Arc;
 
 use ash::vk;
 use gpu_allocator::MemoryLocation;
-use gpu_allocator::vulkan::{Allocation, AllocationCreateDesc, AllocationScheme};
+use gpu_allocator::vulkan::Allocation;
 
 use super::device::{Gpu, vulkan_error};
+use super::memory::{allocate, free};
 use crate::{Error, Result};
 
 /// Mapped memory of one fixed size.
 #[derive(Debug)]
 pub struct Buffer {
     pub(super) raw: vk::Buffer,
-    pub(super) bytes: u64,
+    bytes: u64,
     name: &'static str,
     allocation: ManuallyDrop<Allocation>,
-    gpu: Arc<Gpu>,
+    pub(super) gpu: Arc<Gpu>,
 }
 
 impl Buffer {
@@ -38,22 +39,16 @@ impl Buffer {
         }
         let mut buffer =
             Self::new(gpu, name, bytes, vk::BufferUsageFlags::STORAGE_BUFFER, MemoryLocation::CpuToGpu)?;
-        buffer.write(data);
+        buffer.write_bytes(0, bytemuck::cast_slice(data));
         Ok(buffer)
     }
 
-    pub(super) fn staging<T: bytemuck::NoUninit>(
-        gpu: &Arc<Gpu>,
-        name: &'static str,
-        data: &[T],
-    ) -> Result<Self> {
-        let bytes = size_of_val(data) as u64;
-        let mut buffer =
-            Self::new(gpu, name, bytes, vk::BufferUsageFlags::TRANSFER_SRC, MemoryLocation::CpuToGpu)?;
-        buffer.write(data);
-        Ok(buffer)
+    /// A buffer that the device copies from.
+    pub(super) fn staging(gpu: &Arc<Gpu>, name: &'static str, bytes: u64) -> Result<Self> {
+        Self::new(gpu, name, bytes, vk::BufferUsageFlags::TRANSFER_SRC, MemoryLocation::CpuToGpu)
     }
 
+    /// A buffer that the device copies to.
     pub(super) fn readback(gpu: &Arc<Gpu>, name: &'static str, bytes: u64) -> Result<Self> {
         Self::new(gpu, name, bytes, vk::BufferUsageFlags::TRANSFER_DST, MemoryLocation::GpuToCpu)
     }
@@ -67,6 +62,7 @@ impl Buffer {
     ) -> Result<Self> {
         gpu.check_memory(name, bytes)?;
         let info = vk::BufferCreateInfo::default().size(bytes).usage(usage);
+        assert!(bytes > 0, "{name}: Vulkan has no empty buffers");
         // SAFETY: the size is at least 1 and the device outlives the buffer, which holds it.
         let raw = unsafe { gpu.raw.create_buffer(&info, None) }
             .map_err(|error| vulkan_error(&format!("creating the buffer of {name}"), error))?;
@@ -87,28 +83,29 @@ impl Buffer {
         Ok(buffer)
     }
 
-    /// Overwrites the first `data.len()` elements.
+    /// Overwrites the first `data.len()` elements of a buffer made by [`Buffer::storage`]; where they are more than it
+    /// holds, a new one takes its place.
     ///
-    /// # Panics
-    /// Where `data` is longer than the buffer.
-    pub fn write<T: bytemuck::NoUninit>(&mut self, data: &[T]) {
-        let bytes: &[u8] = bytemuck::cast_slice(data);
-        let name = self.name;
-        let mapped = self
-            .allocation
-            .mapped_slice_mut()
-            .unwrap_or_else(|| panic!("{name} lies in host-visible memory"));
-        mapped[..bytes.len()].copy_from_slice(bytes);
+    /// # Errors
+    /// As [`Buffer::storage`].
+    pub fn refill<T: bytemuck::NoUninit>(&mut self, data: &[T]) -> Result<()> {
+        if size_of_val(data) as u64 > self.bytes {
+            *self = Self::storage(&self.gpu, self.name, data)?;
+        } else {
+            self.write_bytes(0, bytemuck::cast_slice(data));
+        }
+        Ok(())
     }
 
-    /// How many elements of `T` fit.
-    pub fn capacity<T>(&self) -> usize {
-        usize::try_from(self.bytes).expect("mapped memory fits the address space") / size_of::<T>()
+    /// Overwrites bytes from `start` on; panics where they do not fit.
+    pub(super) fn write_bytes(&mut self, start: usize, bytes: &[u8]) {
+        let mapped = self.allocation.mapped_slice_mut().expect("buffers are host-visible");
+        mapped[start..start + bytes.len()].copy_from_slice(bytes);
     }
 
     /// The buffer's contents.
     pub(super) fn read(&self) -> &[u8] {
-        let mapped = self.allocation.mapped_slice().expect("readback memory is host-visible");
+        let mapped = self.allocation.mapped_slice().expect("buffers are host-visible");
         &mapped[..usize::try_from(self.bytes).expect("mapped memory fits the address space")]
     }
 }
@@ -121,37 +118,4 @@ impl Drop for Buffer {
             free(&self.gpu, &mut self.allocation);
         }
     }
-}
-
-pub(super) fn allocate(
-    gpu: &Gpu,
-    name: &str,
-    requirements: vk::MemoryRequirements,
-    location: MemoryLocation,
-    linear: bool,
-) -> Result<Allocation> {
-    let description = AllocationCreateDesc {
-        name,
-        requirements,
-        location,
-        linear,
-        allocation_scheme: AllocationScheme::GpuAllocatorManaged,
-    };
-    gpu.allocator.lock().unwrap_or_else(PoisonError::into_inner).allocate(&description).map_err(|error| {
-        Error::OutOfMemory {
-            message: format!("no {} MiB of device memory for {name}: {error}", requirements.size >> 20),
-            help: Some("use a smaller picture, volume or mesh".into()),
-        }
-    })
-}
-
-/// Returns memory to the allocator.
-///
-/// # Safety
-/// The allocation is not used again, by the host or the device.
-pub(super) unsafe fn free(gpu: &Gpu, allocation: &mut ManuallyDrop<Allocation>) {
-    // SAFETY: the caller gives it up.
-    let allocation = unsafe { ManuallyDrop::take(allocation) };
-    let freed = gpu.allocator.lock().unwrap_or_else(PoisonError::into_inner).free(allocation);
-    debug_assert!(freed.is_ok(), "{freed:?}");
 }

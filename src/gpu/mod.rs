@@ -1,6 +1,7 @@
 //! The device layer: the only place with `ash` and `unsafe`.
 //!
-//! Everything here is safe to call. Objects hold the [`Gpu`] that made them, so that nothing outlives its
+//! Everything here is safe to call, so long as a [`PipelineInfo`] and the indices that a [`Batch`] draws are those that
+//! the shaders expect: that alone is not checked. Objects hold the [`Gpu`] that made them, so that nothing outlives its
 //! device. Work is recorded, submitted and waited for one call at a time: there is one queue, and the
 //! one barrier policy is that a submission sees all that the host wrote before it, and the host sees all that a
 //! submission wrote once the call returns.
@@ -9,12 +10,18 @@
 pub mod buffer;
 pub mod device;
 pub mod draw;
+mod format;
+mod image;
+mod memory;
+pub mod pipeline;
 pub mod shaders;
+mod submit;
 pub mod target;
 pub mod texture;
 
 pub use buffer::Buffer;
 pub use device::{DeviceChoice, DeviceInfo, Gpu, Messages, devices};
-pub use draw::{Batch, Draw, DrawTimes, Pipeline, PipelineInfo, draw};
+pub use draw::{Batch, Draw, DrawTimes, draw};
+pub use pipeline::{Pipeline, PipelineInfo};
 pub use target::Target;
 pub use texture::Texture3d;

@@ -3,12 +3,12 @@
 use std::sync::Arc;
 
 use ash::vk;
-use gpu_allocator::MemoryLocation;
 
 use super::buffer::Buffer;
 use super::device::{Gpu, vulkan_error};
-use super::draw::submit;
-use super::target::{DeviceImage, transition};
+use super::format::Rgba;
+use super::image::{DeviceImage, whole};
+use super::submit::submit;
 use crate::volume::Pyramid;
 use crate::{Error, Result};
 
@@ -17,19 +17,35 @@ use crate::{Error, Result};
 pub struct Texture3d {
     pub(super) image: DeviceImage,
     pub(super) sampler: vk::Sampler,
-    format: vk::Format,
-    gpu: Arc<Gpu>,
+    pub(super) gpu: Arc<Gpu>,
 }
 
-/// Formats by falling accuracy; devices need only offer the last with linear filtering.
-const FORMATS: [vk::Format; 2] = [vk::Format::R32G32B32A32_SFLOAT, vk::Format::R16G16B16A16_SFLOAT];
+/// What an image is used for: its layout, and the accesses in the stages that must be done, or must wait.
+type Use = (vk::ImageLayout, vk::AccessFlags, vk::PipelineStageFlags);
+
+const NOTHING: Use =
+    (vk::ImageLayout::UNDEFINED, vk::AccessFlags::empty(), vk::PipelineStageFlags::TOP_OF_PIPE);
+const COPY: Use = (
+    vk::ImageLayout::TRANSFER_DST_OPTIMAL,
+    vk::AccessFlags::TRANSFER_WRITE,
+    vk::PipelineStageFlags::TRANSFER,
+);
+const SAMPLING: Use = (
+    vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL,
+    vk::AccessFlags::SHADER_READ,
+    vk::PipelineStageFlags::FRAGMENT_SHADER,
+);
 
 impl Texture3d {
     /// Uploads all levels in the most accurate format that the device filters linearly.
     ///
     /// # Errors
     /// [`Error::Device`] where a side is longer than the device allows; [`Error::OutOfMemory`].
+    ///
+    /// # Panics
+    /// Where the pyramid has no level, or levels of other sizes than a [`Pyramid`] promises.
     pub fn upload(gpu: &Arc<Gpu>, name: &'static str, pyramid: &Pyramid) -> Result<Self> {
+        assert_is_pyramid(pyramid);
         let [width, height, depth] = pyramid.levels[0].size;
         let limit = gpu.limits.max_image_dimension3_d;
         if width.max(height).max(depth) > limit {
@@ -43,41 +59,26 @@ impl Texture3d {
         }
         let features =
             vk::FormatFeatureFlags::SAMPLED_IMAGE_FILTER_LINEAR | vk::FormatFeatureFlags::TRANSFER_DST;
-        let format = FORMATS.into_iter().find(|format| gpu.supports(*format, features)).ok_or_else(|| {
-            Error::Device {
-                message: format!("{} filters no floating-point 3D texture", gpu.info().name),
-                help: None,
-            }
+        let format = Rgba::best(gpu, features).ok_or_else(|| Error::Device {
+            message: format!("{} filters no floating-point 3D texture", gpu.info().name),
+            help: None,
         })?;
         let texels: u64 = pyramid.levels.iter().map(|level| level.texels.len() as u64).sum();
-        let texel_bytes: u64 = if format == vk::Format::R32G32B32A32_SFLOAT { 16 } else { 8 };
+        let bytes = texels * format.bytes();
         // Once on the device, once in the staging buffer.
-        gpu.check_memory(name, 2 * texels * texel_bytes)?;
-
-        let staging = match format {
-            vk::Format::R32G32B32A32_SFLOAT => {
-                let data: Vec<[f32; 4]> =
-                    pyramid.levels.iter().flat_map(|l| l.texels.iter().copied()).collect();
-                Buffer::staging(gpu, name, &data)?
-            }
-            _ => {
-                let half = |texel: &[f32; 4]| texel.map(half::f16::from_f32);
-                let data: Vec<[half::f16; 4]> =
-                    pyramid.levels.iter().flat_map(|l| l.texels.iter().map(half)).collect();
-                Buffer::staging(gpu, name, &data)?
-            }
-        };
+        gpu.check_memory(name, 2 * bytes)?;
+        let mut staging = Buffer::staging(gpu, name, bytes)?;
         let levels = u32::try_from(pyramid.levels.len()).expect("at most 32 levels");
         let info = vk::ImageCreateInfo::default()
             .image_type(vk::ImageType::TYPE_3D)
-            .format(format)
+            .format(format.raw())
             .extent(vk::Extent3D { width, height, depth })
             .mip_levels(levels)
             .array_layers(1)
             .samples(vk::SampleCountFlags::TYPE_1)
             .tiling(vk::ImageTiling::OPTIMAL)
             .usage(vk::ImageUsageFlags::SAMPLED | vk::ImageUsageFlags::TRANSFER_DST);
-        let image = DeviceImage::new(gpu, name, &info, vk::ImageViewType::TYPE_3D, MemoryLocation::GpuOnly)?;
+        let image = DeviceImage::new(gpu, name, &info, vk::ImageViewType::TYPE_3D)?;
 
         let mut regions = Vec::new();
         let mut offset = 0;
@@ -85,7 +86,7 @@ impl Texture3d {
             let [width, height, depth] = volume.size;
             regions.push(
                 vk::BufferImageCopy::default()
-                    .buffer_offset(offset)
+                    .buffer_offset(offset as u64)
                     .image_subresource(vk::ImageSubresourceLayers {
                         aspect_mask: vk::ImageAspectFlags::COLOR,
                         mip_level: level,
@@ -94,48 +95,18 @@ impl Texture3d {
                     })
                     .image_extent(vk::Extent3D { width, height, depth }),
             );
-            offset += volume.texels.len() as u64 * texel_bytes;
+            let texels = format.encode(&volume.texels);
+            staging.write_bytes(offset, &texels);
+            offset += texels.len();
         }
         submit(gpu, "uploading the volume", |commands| {
-            // SAFETY: image and buffer live until the submission is waited for; the regions lie within both.
+            transition(gpu, commands, &image, NOTHING, COPY);
+            // SAFETY: image and buffer live until the submission is waited for; the regions lie within both, since
+            // each level was found to have the size of a mip level, and its texels.
             unsafe {
-                let to_transfer = transition(
-                    image.raw,
-                    (vk::ImageLayout::UNDEFINED, vk::AccessFlags::empty()),
-                    (vk::ImageLayout::TRANSFER_DST_OPTIMAL, vk::AccessFlags::TRANSFER_WRITE),
-                );
-                let stages = (vk::PipelineStageFlags::TOP_OF_PIPE, vk::PipelineStageFlags::TRANSFER);
-                gpu.raw.cmd_pipeline_barrier(
-                    commands,
-                    stages.0,
-                    stages.1,
-                    vk::DependencyFlags::empty(),
-                    &[],
-                    &[],
-                    &[to_transfer],
-                );
-                gpu.raw.cmd_copy_buffer_to_image(
-                    commands,
-                    staging.raw,
-                    image.raw,
-                    vk::ImageLayout::TRANSFER_DST_OPTIMAL,
-                    &regions,
-                );
-                let to_shader = transition(
-                    image.raw,
-                    (vk::ImageLayout::TRANSFER_DST_OPTIMAL, vk::AccessFlags::TRANSFER_WRITE),
-                    (vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL, vk::AccessFlags::SHADER_READ),
-                );
-                gpu.raw.cmd_pipeline_barrier(
-                    commands,
-                    vk::PipelineStageFlags::TRANSFER,
-                    vk::PipelineStageFlags::FRAGMENT_SHADER,
-                    vk::DependencyFlags::empty(),
-                    &[],
-                    &[],
-                    &[to_shader],
-                );
+                gpu.raw.cmd_copy_buffer_to_image(commands, staging.raw, image.raw, COPY.0, &regions);
             }
+            transition(gpu, commands, &image, COPY, SAMPLING);
         })?;
         let sampler_info = vk::SamplerCreateInfo::default()
             .mag_filter(vk::Filter::LINEAR)
@@ -148,13 +119,37 @@ impl Texture3d {
         // SAFETY: a plain sampler of a device that outlives it.
         let sampler = unsafe { gpu.raw.create_sampler(&sampler_info, None) }
             .map_err(|error| vulkan_error("creating the volume's sampler", error))?;
-        Ok(Self { image, sampler, format, gpu: gpu.clone() })
+        Ok(Self { image, sampler, gpu: gpu.clone() })
     }
+}
 
-    /// The texels' format, as in `"R32G32B32A32_SFLOAT"`.
-    pub fn format(&self) -> String {
-        format!("{:?}", self.format)
+/// Each level has the size that Vulkan gives a mip level, and as many texels.
+fn assert_is_pyramid(pyramid: &Pyramid) {
+    let full = pyramid.levels[0].size;
+    assert!(full.into_iter().all(|side| side > 0), "a volume of {full:?} texels");
+    let most = u32::BITS - full.into_iter().max().unwrap_or(0).leading_zeros();
+    assert!(pyramid.levels.len() <= most as usize, "a pyramid above {full:?} texels has {most} levels");
+    for (level, volume) in pyramid.levels.iter().enumerate() {
+        assert_eq!(volume.size, full.map(|side| (side >> level).max(1)), "level {level}");
+        let texels = volume.size.into_iter().map(|side| side as usize).product::<usize>();
+        assert_eq!(volume.texels.len(), texels, "level {level} of {:?} texels", volume.size);
     }
+}
+
+/// Records that an image goes from one use to another, with all of its levels.
+fn transition(gpu: &Gpu, commands: vk::CommandBuffer, image: &DeviceImage, from: Use, to: Use) {
+    let barrier = vk::ImageMemoryBarrier::default()
+        .image(image.raw)
+        .old_layout(from.0)
+        .src_access_mask(from.1)
+        .new_layout(to.0)
+        .dst_access_mask(to.1)
+        .src_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
+        .dst_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
+        .subresource_range(whole());
+    let flags = vk::DependencyFlags::empty();
+    // SAFETY: the commands are being recorded, and the image lives until their submission is waited for.
+    unsafe { gpu.raw.cmd_pipeline_barrier(commands, from.2, to.2, flags, &[], &[], &[barrier]) };
 }
 
 impl Drop for Texture3d {

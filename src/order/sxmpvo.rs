@@ -15,7 +15,7 @@ use crate::shell::{Shell, Topology};
 pub struct Times {
     /// Exact signs of all faces, and the relations that they give.
     pub relations: Duration,
-    /// The A-buffer of exterior faces, and the relations that it gives.
+    /// The A-buffer of boundary faces, and the relations that it gives.
     pub abuffer: Duration,
     /// The graph, and the search in it.
     pub search: Duration,

@@ -67,7 +67,7 @@ impl Crossings {
             planes.push(own);
         }
         let mut boxes: Vec<PaddedBox> = (0..shell.cells.len())
-            .filter(|&tetrahedron| has_volume(shell, tetrahedron))
+            .filter(|&tetrahedron| shell.cells[tetrahedron].has_maps())
             .map(|tetrahedron| {
                 let vertices = shell.topology.tetrahedra[tetrahedron]
                     .map(|vertex| shell.vertices[vertex as usize] - eye);
@@ -120,10 +120,6 @@ impl Crossings {
     }
 }
 
-fn has_volume(shell: &Shell, tetrahedron: usize) -> bool {
-    shell.cells[tetrahedron].gradients != [DVec3::ZERO; 4]
-}
-
 fn own_plane(shell: &Shell, eye: DVec3, tetrahedron: usize, face: usize) -> Plane {
     let gradient = shell.cells[tetrahedron].gradients[face];
     let on_face = shell.topology.tetrahedra[tetrahedron][(face + 1) % 4];
@@ -135,11 +131,14 @@ fn own_plane(shell: &Shell, eye: DVec3, tetrahedron: usize, face: usize) -> Plan
 fn shared_plane(shell: &Shell, planes: &[[Plane; 4]], tetrahedron: usize, face: usize) -> Option<Plane> {
     let topology = &shell.topology;
     let neighbour = topology.neighbours[tetrahedron][face];
-    if neighbour == EXTERIOR || neighbour as usize >= tetrahedron || !has_volume(shell, neighbour as usize) {
+    if neighbour == EXTERIOR || neighbour as usize >= tetrahedron {
+        return None;
+    }
+    let neighbour = neighbour as usize;
+    if !shell.cells[neighbour].has_maps() {
         return None;
     }
     let vertices = topology.tetrahedra[tetrahedron];
-    let neighbour = neighbour as usize;
     let is_on_face = |vertex: u32| (0..4).any(|k| k != face && vertices[k] == vertex);
     let back = (0..4).find(|&k| {
         topology.neighbours[neighbour][k] as usize == tetrahedron

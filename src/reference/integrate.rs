@@ -28,6 +28,7 @@ use super::quadrature::{AtNodes, NODES, Rule, dot};
 use super::texture::{ALPHA, CLEAR, Cubic, Lattice, Texel};
 use super::{Counts, Reference, Sample};
 use crate::scene::Scene;
+use crate::volume::Quantity;
 
 /// Width, as a part of its piece, of the panels that are taken as they are: see the head of this file.
 const NARROWEST: f64 = 1e-15;
@@ -53,7 +54,7 @@ struct Layer<'a> {
 struct Panel {
     transmittance: f64,
     /// Premultiplied.
-    color: [f64; 3],
+    colour: [f64; 3],
     alpha: f64,
     /// `integral of T sigma (z - near end) dz`.
     moment: f64,
@@ -84,7 +85,7 @@ pub(super) struct RayIntegral<'a> {
     total_length: f64,
     layers: Vec<Layer<'a>>,
     transmittance: f64,
-    color: [f64; 3],
+    colour: [f64; 3],
     alpha: f64,
     /// `integral of T sigma z dz`.
     moment: f64,
@@ -110,13 +111,13 @@ impl<'a> RayIntegral<'a> {
             total_length: crossings.iter().map(|crossing| crossing.exit - crossing.enter).sum(),
             layers: Vec::new(),
             transmittance: 1.0,
-            color: [0.0; 3],
+            colour: [0.0; 3],
             alpha: 0.0,
             moment: 0.0,
             counts: Counts { rays: 1, ..Counts::default() },
         };
         integral.sweep(crossings);
-        let [r, g, b] = integral.color;
+        let [r, g, b] = integral.colour;
         let distance = integral.moment / integral.alpha * integral.stretch;
         let sample = Sample {
             rgba: [r, g, b, integral.alpha.min(1.0)],
@@ -223,7 +224,8 @@ impl<'a> RayIntegral<'a> {
             return;
         }
         let piece = Piece { start: span_start + from, length: to - from };
-        if self.layers.iter().any(Layer::is_wall) {
+        let can_be_wall = self.scene.volume.levels[0].quantity == Quantity::Opacity;
+        if can_be_wall && self.layers.iter().any(Layer::is_wall) {
             self.stop_at_wall(piece.start);
         } else {
             self.panels(piece, 0.0, 1.0);
@@ -236,7 +238,7 @@ impl<'a> RayIntegral<'a> {
         let part = self.transmittance / walls.len() as f64;
         for layer in walls {
             let texel = layer.at(0.0, depth);
-            for (sum, premultiplied) in self.color.iter_mut().zip(texel) {
+            for (sum, premultiplied) in self.colour.iter_mut().zip(texel) {
                 *sum += part * premultiplied;
             }
         }
@@ -259,8 +261,8 @@ impl<'a> RayIntegral<'a> {
             }
             return;
         }
-        for (sum, color) in self.color.iter_mut().zip(panel.color) {
-            *sum += self.transmittance * color;
+        for (sum, colour) in self.colour.iter_mut().zip(panel.colour) {
+            *sum += self.transmittance * colour;
         }
         let start = piece.start + low * piece.length;
         self.alpha += self.transmittance * panel.alpha;
@@ -273,13 +275,17 @@ impl<'a> RayIntegral<'a> {
         let rule = self.rule;
         let width = high - low;
         let opacity_distance = self.scene.medium.opacity_distance;
+        let quantity = self.scene.volume.levels[0].quantity;
         let mut extinction: AtNodes = [0.0; NODES];
         let mut emission: [AtNodes; 3] = [[0.0; NODES]; 3];
         for i in 0..NODES {
             let x = low + width * rule.nodes[i];
             for layer in &self.layers {
                 let texel = layer.at(x, piece.start + x * piece.length);
-                let per_alpha = extinction_per_alpha(texel[ALPHA], texel[CLEAR]);
+                let per_alpha = match quantity {
+                    Quantity::Opacity => extinction_per_alpha(texel[ALPHA], texel[CLEAR]),
+                    Quantity::Extinction => 1.0,
+                };
                 extinction[i] += per_alpha * texel[ALPHA];
                 for (emission, premultiplied) in emission.iter_mut().zip(texel) {
                     emission[i] += per_alpha * premultiplied;
@@ -304,14 +310,14 @@ impl<'a> RayIntegral<'a> {
         let mut error = self.brightness * (alpha - coarse_alpha).abs();
         error = error.max((alpha - dot(&rule.weights, &absorbed)).abs());
         error = error.max((alpha - dot(&rule.coarse_weights, &absorbed)).abs());
-        let color = emission.map(|emission| {
+        let colour = emission.map(|emission| {
             let arriving: AtNodes = std::array::from_fn(|i| transmittance[i] * scale * emission[i]);
-            let color = dot(&rule.weights, &arriving);
-            error = error.max((color - dot(&rule.coarse_weights, &arriving)).abs());
-            color
+            let colour = dot(&rule.weights, &arriving);
+            error = error.max((colour - dot(&rule.coarse_weights, &arriving)).abs());
+            colour
         });
         let moment: f64 = (0..NODES).map(|i| rule.weights[i] * absorbed[i] * rule.nodes[i]).sum();
-        Panel { transmittance: (-total_depth).exp(), color, alpha, moment: moment * length, error }
+        Panel { transmittance: (-total_depth).exp(), colour, alpha, moment: moment * length, error }
     }
 }
 

@@ -1,7 +1,8 @@
 //! The f64 reference integrator: what every other method is measured against.
 //!
-//! It evaluates the integral of the medium (DESIGN sections 1 and 5) along each pixel's ray on the CPU,
-//! in f64, to [`TOLERANCE`], and was derived from that integral, from no shader:
+//! It evaluates the volume rendering integral (absorption plus emission: N. Max, *Optical models for direct volume
+//! rendering*, 1995, section 4) of the medium of Dufort, Leblanc and Poulin 2005, section 4.3, along each pixel's ray on
+//! the CPU, in f64, to [`TOLERANCE`], and was derived from that integral, from no shader:
 //!
 //! ```text
 //!   C = integral of T(s) sigma(s) c(s) ds      T(s) = exp(-integral of sigma from the near plane to s)

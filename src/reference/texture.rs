@@ -1,7 +1,7 @@
 //! The texture along a ray: trilinear reconstruction as one cubic polynomial a cell.
 //!
-//! Texel centres lie at `(i + 1/2) / n`; u and v repeat, w clamps to the edge (DESIGN section 1, and
-//! Vulkan 1.3, "Texel Filtering"). A *cell* is the box between eight neighbouring texel centres. Texture
+//! Texel centres lie at `(i + 1/2) / n`; u and v repeat, w clamps to the edge (Vulkan 1.3, "Texel
+//! Filtering"). A *cell* is the box between eight neighbouring texel centres. Texture
 //! coordinates are affine in the ray's depth, so within a cell the reconstruction is a product of
 //! three linear functions: a cubic, kept in Bernstein form. Its coefficients are weighted means
 //! of the corners, so `1 - alpha` is a sum of terms that are not negative and keeps its relative accuracy
@@ -169,6 +169,7 @@ mod tests {
     use rand_pcg::Pcg32;
 
     use super::*;
+    use crate::volume::Quantity;
 
     /// The trilinear filter, term by term.
     fn filtered(volume: &Volume, texture: DVec3) -> [f64; 4] {
@@ -196,7 +197,7 @@ mod tests {
         let mut random = Pcg32::seed_from_u64(3);
         let size = [5, 3, 4];
         let texels = (0..60).map(|_| [0.0; 4].map(|_: f32| random.random::<f32>())).collect();
-        let volume = Volume { size, texels };
+        let volume = Volume { size, texels, quantity: Quantity::Opacity };
         for ray in 0..40 {
             let mut vector = || DVec3::from_array([0.0; 3].map(|_: f64| random.random_range(-1.5..1.5)));
             // Some start on a plane of texel centres, some run along an axis.
@@ -231,7 +232,11 @@ mod tests {
     #[test]
     fn empty_cells_and_walls_are_known_exactly() {
         let layer = |alpha: f32| [alpha; 4];
-        let volume = Volume { size: [1, 1, 4], texels: [0.0, 0.0, 1.0, 1.0].map(layer).to_vec() };
+        let volume = Volume {
+            size: [1, 1, 4],
+            texels: [0.0, 0.0, 1.0, 1.0].map(layer).to_vec(),
+            quantity: Quantity::Opacity,
+        };
         let mut lattice = Lattice::new(&volume, DVec3::new(0.1, 0.2, 0.0), DVec3::Z);
         // Texel centres at w = 1/8, 3/8, 5/8, 7/8; below the first and above the last, w clamps.
         assert_eq!(lattice.cubic(0.0, 0.125), None);

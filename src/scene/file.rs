@@ -11,11 +11,12 @@ use serde::Deserialize;
 use toml::Spanned;
 
 use super::camera::DEFAULT_FOV_DEGREES;
-use super::number::{
-    Exactly, FieldOfView, Finite, Fraction, NotNegative, PictureSize, Pixels, Positive, Rounds, Samples, Step,
-};
 use crate::mesh::generate::Generator;
 use crate::mesh::projection::Projection;
+use crate::value::{
+    Colour, Exactly, FieldOfView, Finite, Fraction, NotNegative, PictureSize, Pixels, Positive, Rounds,
+    Samples, Step,
+};
 use crate::volume::TransferFunction;
 
 /// A whole scene file.
@@ -77,6 +78,8 @@ pub struct VolumeSection {
     pub file: Option<PathBuf>,
     /// How the scalars of a file become colour and opacity.
     pub transfer: Option<TransferFunction>,
+    /// How the scalars of a file become extinction.
+    pub density: Option<DensitySection>,
     /// The opacity of every texel of a file that has red, green and blue alone.
     pub alpha: Option<Fraction>,
     /// World units; by default one level-0 texel along w.
@@ -84,6 +87,16 @@ pub struct VolumeSection {
     /// In pixels.
     #[serde(default = "one_pixel")]
     pub lod_footprint: NotNegative,
+}
+
+/// `[volume.density]`: the scalars of a file are densities.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DensitySection {
+    /// Extinction where the file says 1, per world unit.
+    pub extinction: Positive,
+    /// By default white.
+    pub colour: Option<Colour>,
 }
 
 /// `[camera]`.
@@ -109,8 +122,8 @@ pub struct CameraSection {
 pub struct ImageSection {
     /// Width and height.
     pub size: PictureSize,
-    /// Linear RGB; a transparent picture without it.
-    pub background: Option<Exactly<3, NotNegative>>,
+    /// What lies behind the shell; a transparent picture without it.
+    pub background: Option<Colour>,
 }
 
 /// `[march]`.
@@ -133,6 +146,8 @@ pub enum Plan {
     Default,
     /// The same number in every tetrahedron.
     Paper,
+    /// Cell by cell.
+    Exact,
 }
 
 impl Default for ImageSection {

@@ -7,8 +7,7 @@ use glam::{DVec2, DVec3};
 use toml::Spanned;
 
 use super::camera::DEFAULT_NEAR;
-use super::file::{CameraSection, MeshSection, Plan, SceneFile, VolumeSection};
-use super::number::{Exactly, Finite};
+use super::file::{CameraSection, DensitySection, MeshSection, Plan, SceneFile, VolumeSection};
 use super::text::Text;
 use super::{Camera, March, Medium, Scene, View};
 use crate::frame::{Stage, Stopwatch};
@@ -17,6 +16,7 @@ use crate::mesh::projection::Projection;
 use crate::mesh::{Mesh, obj};
 use crate::progress::{Progress, Silent};
 use crate::shell::{Shell, ShellOptions};
+use crate::value::{Exactly, Finite};
 use crate::volume::{self, Interpretation, Pyramid, Volume, recipe};
 use crate::{Error, Result};
 
@@ -88,6 +88,8 @@ fn build(text: &Text, base_dir: &Path, progress: &dyn Progress) -> Result<Loaded
 
     progress.stage("loading the volume");
     let section = file.volume.get_ref();
+    // The path that a density of 1 makes one optical depth long.
+    let mean_free_path = section.density.as_ref().map(|density| density.extinction.0.recip());
     let volume = volume.load(base_dir)?;
     let texel_along_w = options.thickness / f64::from(volume.size[2]);
     stopwatch.lap("load.volume");
@@ -101,17 +103,20 @@ fn build(text: &Text, base_dir: &Path, progress: &dyn Progress) -> Result<Loaded
     let scene = Scene {
         view: View { camera, width, height, depth: false },
         medium: Medium {
-            opacity_distance: section.opacity_distance.map_or(texel_along_w, |distance| distance.0),
+            opacity_distance: mean_free_path
+                .or(section.opacity_distance.map(|distance| distance.0))
+                .unwrap_or(texel_along_w),
             lod_footprint: section.lod_footprint.0,
         },
         march: match file.march.plan {
             Plan::Default => March::Default { step: file.march.step.0 },
             Plan::Paper => March::Paper { samples: file.march.samples.0 },
+            Plan::Exact => March::Exact,
         },
         shell,
         volume,
     };
-    let background = file.image.background.map(|rgb| rgb.0.map(|x| x.0 as f32));
+    let background = file.image.background.map(|colour| colour.0.to_array());
     Ok(Loaded { scene, background, stages: stopwatch.finish() })
 }
 
@@ -155,11 +160,21 @@ enum VolumeSource<'a> {
 impl<'a> VolumeSource<'a> {
     fn of(text: &Text, section: &'a Spanned<VolumeSection>) -> Result<Self> {
         match section.get_ref() {
-            VolumeSection { recipe: Some(path), file: None, transfer: None, alpha: None, .. } => {
+            VolumeSection {
+                recipe: Some(path), file: None, transfer: None, density: None, alpha: None, ..
+            } => {
                 Ok(Self::Recipe(path))
             }
-            VolumeSection { recipe: None, file: Some(path), transfer, alpha, .. } => {
+            VolumeSection { density: Some(_), opacity_distance: Some(_), .. } => Err(text.error(
+                section.span(),
+                "[volume.density] says itself how dense the volume is: leave out `opacity_distance`",
+            )),
+            VolumeSection { recipe: None, file: Some(path), transfer, density, alpha, .. } => {
+                let colour = |density: &DensitySection| {
+                    density.colour.map_or([1.0; 3], |colour| colour.0.to_array())
+                };
                 let interpretation = Interpretation {
+                    density: density.as_ref().map(colour),
                     alpha_mode: None,
                     constant_alpha: alpha.map(|alpha| alpha.0 as f32),
                     transfer: transfer.clone(),
@@ -168,7 +183,7 @@ impl<'a> VolumeSource<'a> {
             }
             _ => Err(text.error(
                 section.span(),
-                "[volume] needs either `recipe`, or `file` with what it may need of `transfer` and `alpha`",
+                "[volume] needs either `recipe`, or `file` with what it may need of `transfer`, `density` and `alpha`",
             )),
         }
     }
@@ -258,6 +273,8 @@ recipe = "fog.toml"
         assert_eq!(scene.medium.opacity_distance, 1.0);
         assert_eq!(scene.march, March::Paper { samples: 3 });
         assert_eq!(background, Some([0.0, 0.5, 1.0]));
+        let background = loaded(&["image.background=#ff0000"]).unwrap().background;
+        assert_eq!(background, Some([1.0, 0.0, 0.0]));
         assert_eq!((scene.view.camera.eye.z, scene.view.camera.near), (9.0, 2.0));
         assert_eq!(scene.view.camera.fov_y, std::f64::consts::FRAC_PI_2);
         // A row of the five spans a fifth of the texture's 3.5 repeats.
@@ -291,6 +308,14 @@ recipe = "fog.toml"
         ["[mesh]", "[image]\nsize = [9, 32769]\n[mesh]", "32769", "from 1 to 32768"],
         ["[mesh]", "[image]\nsize = [32768, 32768]\n[mesh]", "[32768, 32768]", "2^28 pixels"],
         ["[mesh]", "[image]\nbackground = [0, -1, 0]\n[mesh]", "-1", "at least 0"],
+        ["[mesh]", "[image]\nbackground = '#12345'\n[mesh]", "'#12345'", "a colour such as"],
+        ["[mesh]", "[image]\nbackground = [0, 1, 0, 1]\n[mesh]", "[0, 1, 0, 1]", "a list of 3"],
+        [
+            "\"fog.toml\"",
+            "\"fog.toml\"\ntransfer.points = [{ value = 0, colour = 'red', alpha = 1 }]",
+            "'red'",
+            "a colour",
+        ],
         ["[mesh]", "[march]\nplan = 'papr'\n[mesh]", "'papr'", "`default` or `paper`"],
         ["[mesh]", "[march]\nsamples = 0\n[mesh]", "0", "from 1 to 4096"],
         ["[mesh]", "[march]\nstep = 0\n[mesh]", "0", "from 0.001"],
@@ -345,6 +370,7 @@ recipe = "fog.toml"
             ("mesh.file=", "value"),
             ("[shell]\nthickness=1", "not a dotted key"),
             ("camera.eye=[0,0,1]", "missing key `target`"),
+            ("image.background=#12345", "a colour such as"),
         ];
         for (text, part) in mistakes {
             // One that is right stands before, so that blame must find its way.

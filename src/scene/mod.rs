@@ -20,7 +20,6 @@
 pub mod camera;
 pub mod file;
 pub mod load;
-pub(crate) mod number;
 pub(crate) mod text;
 
 pub use camera::{Camera, View};
@@ -50,7 +49,8 @@ pub struct Scene {
 /// What the texture means. It belongs to the medium, not to the march: the reference obeys it too.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Medium {
-    /// The path length, in world units, whose opacity the texture's alpha is.
+    /// The path length, in world units, whose opacity, or optical depth, the texture's alpha is: see
+    /// [`Quantity`](crate::volume::Quantity).
     pub opacity_distance: f64,
     /// The filter footprint in pixels (1 = one pixel; 0 = always level 0).
     ///
@@ -71,11 +71,14 @@ pub enum March {
         /// At least 1.
         samples: u32,
     },
-    /// Samples by length: `ceil(length / step)`, at least one.
+    /// Midpoints by length: `ceil(length / step)`, at least one.
     Default {
         /// In texels of the level of detail that the sample is read from; positive.
         step: f64,
     },
+    /// Cell by cell of texel centres, where the texture is a cubic along the ray, by three-point Gauss-Legendre.
+    /// Optical depth is exact where the texture holds extinction.
+    Exact,
 }
 
 impl Default for March {

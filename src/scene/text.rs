@@ -143,7 +143,7 @@ fn override_as_toml(padding: &str, written: &str) -> Result<String> {
         Err(error) => error,
     };
     // A bare word: `{:?}` escapes as TOML's basic strings do for all that may stand in a bare word.
-    let bare = |c: char| c.is_alphanumeric() || "-_./+~@ ".contains(c);
+    let bare = |c: char| c.is_alphanumeric() || "-_./+~@# ".contains(c);
     let as_string = format!("{padding}{key}={value:?}");
     if !value.is_empty() && value.chars().all(bare) && DeTable::parse(&as_string).is_ok() {
         return Ok(as_string);

@@ -31,7 +31,7 @@ pub(super) struct Faults {
 impl Faults {
     /// Those of one tetrahedron, given six times its volume.
     pub(super) fn of(vertices: [DVec3; 4], determinant: f64, cell: &Cell) -> Self {
-        if *cell == Cell::default() {
+        if !cell.has_maps() {
             return Self { zero_volume: 1, ..Self::default() };
         }
         Self {

@@ -60,6 +60,13 @@ pub struct Cell {
     pub texture_from_world: DMat3,
 }
 
+impl Cell {
+    /// Whether there are maps: nothing is drawn of a tetrahedron without.
+    pub fn has_maps(&self) -> bool {
+        self.gradients != [DVec3::ZERO; 4]
+    }
+}
+
 /// How the shell is built from the mesh.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ShellOptions {

@@ -207,18 +207,18 @@ mod tests {
     }
 
     #[test]
-    fn every_winding_gives_the_designs_three_tetrahedra() {
-        let designed = as_sets(&[[0, 1, 2, 5], [0, 1, 4, 5], [0, 3, 4, 5]]);
+    fn every_winding_gives_the_same_three_tetrahedra() {
+        let expected = as_sets(&[[0, 1, 2, 5], [0, 1, 4, 5], [0, 3, 4, 5]]);
         for triangle in [[0, 1, 2], [1, 2, 0], [2, 0, 1], [0, 2, 1], [2, 1, 0], [1, 0, 2]] {
             let topology = topology(&[triangle]).unwrap();
-            assert_eq!(as_sets(&topology.tetrahedra), designed);
+            assert_eq!(as_sets(&topology.tetrahedra), expected);
             for (ids, corners) in topology.tetrahedra.iter().zip(&topology.corners) {
                 assert_eq!(corners.map(|corner| triangle[corner as usize]), ids.map(|id| id % 3));
             }
             assert_eq!(interior_faces(&topology), 4, "two shared faces, seen from both sides");
         }
         let other = topology(&[[0, 1, 3]]).unwrap();
-        assert_ne!(as_sets(&other.tetrahedra), designed);
+        assert_ne!(as_sets(&other.tetrahedra), expected);
     }
 
     #[test]

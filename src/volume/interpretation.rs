@@ -1,6 +1,6 @@
 //! From the numbers of a file to a medium: linear premultiplied colour and opacity.
 
-use super::{AlphaMode, RawVolume, TransferFunction, Volume};
+use super::{AlphaMode, Quantity, RawVolume, TransferFunction, Volume};
 use crate::{Error, Result};
 
 /// What the numbers of a file are to mean, as far as the file leaves it open.
@@ -12,6 +12,8 @@ pub struct Interpretation {
     pub constant_alpha: Option<f32>,
     /// The colour and opacity of a scalar; volumes of more than one channel take none.
     pub transfer: Option<TransferFunction>,
+    /// The linear colour of a scalar that is a density: extinction in proportion to it, interpolated as such.
+    pub density: Option<[f32; 3]>,
 }
 
 impl Volume {
@@ -25,6 +27,21 @@ impl Volume {
         let RawVolume { path, size, channels, values, full_scale, alpha_mode, .. } = raw;
         let mode = interpretation.alpha_mode.unwrap_or(alpha_mode);
         let scaled = |value: f32| value / full_scale;
+        if let Some(colour) = interpretation.density {
+            let whole = Interpretation { density: Some(colour), ..Interpretation::default() };
+            if channels != 1 || *interpretation != whole {
+                let message = format!(
+                    "has {channels} values a texel; a density is one, and nothing else says what it means"
+                );
+                return Err(
+                    Error::input(path, message).with_help("remove [volume.density], or the other keys")
+                );
+            }
+            let texel =
+                |&value: &f32| premultiplied([colour[0], colour[1], colour[2], value], AlphaMode::Straight);
+            return Self::of(Quantity::Extinction, size, values.iter().map(texel).collect())
+                .map_err(|invalid| Error::input(path, invalid.to_string()));
+        }
         let texels = match (channels, &interpretation.transfer, interpretation.constant_alpha) {
             (1, Some(transfer), None) => {
                 let texel = |&value: &f32| premultiplied(transfer.straight_rgba(value), AlphaMode::Straight);
@@ -84,6 +101,7 @@ fn premultiplied([red, green, blue, alpha]: [f32; 4], mode: AlphaMode) -> [f32; 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::value::Colour;
     use crate::volume::ControlPoint;
 
     fn raw(channels: u32, values: &[f32]) -> RawVolume {
@@ -99,7 +117,7 @@ mod tests {
     }
 
     fn transfer() -> TransferFunction {
-        let point = |value, alpha| ControlPoint { value, colour: [1.0, 0.5, 0.0], alpha };
+        let point = |value, alpha| ControlPoint { value, colour: Colour::linear(1.0, 0.5, 0.0), alpha };
         TransferFunction::new(vec![point(0.0, 0.0), point(200.0, 1.0)]).unwrap()
     }
 

@@ -3,7 +3,6 @@
 //! Read are level 0 of the 3D formats that [`Sample`] lists, as they are or compressed with zlib. The
 //! axes are taken as stored: texel (0, 0, 0) comes first, and x, y, z become u, v, w.
 
-use std::fs::File;
 use std::io::{Read as _, Write as _};
 use std::path::Path;
 
@@ -13,7 +12,7 @@ use ktx2::{Header, Index, LevelIndex, SupercompressionScheme};
 
 use super::raw::{check_fits_memory, claimed_size, file_bytes};
 use super::{AlphaMode, MAX_DEFLATE_RATIO, RawVolume, Sample, Volume};
-use crate::{Error, Result};
+use crate::{Error, Result, output};
 
 /// Reads level 0 of the 3D texture at `path`.
 pub(super) fn read(path: &Path) -> Result<RawVolume> {
@@ -131,21 +130,11 @@ fn write_texture(
     alpha_mode: AlphaMode,
     texels: &[u8],
 ) -> Result<()> {
-    let failed = |error: std::io::Error| Error::Output {
-        path: path.into(),
-        message: format!("cannot be written: {error}"),
-        help: None,
-    };
     let prologue = prologue(size, sample, channels, alpha_mode, texels.len());
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    // A file made by `create_new`, unlike a temporary file, has the permissions that the user's files have.
-    let mut beside = tempfile::Builder::new()
-        .suffix(".partial")
-        .make_in(folder, |path| File::options().write(true).create_new(true).open(path))
-        .map_err(failed)?;
-    beside.write_all(&prologue).and_then(|()| beside.write_all(texels)).map_err(failed)?;
-    beside.persist(path).map_err(|error| failed(error.error))?;
-    Ok(())
+    let mut file = output::file_beside(path)?;
+    let written = file.write_all(&prologue).and_then(|()| file.write_all(texels));
+    written.map_err(|error| output::unwritable(path, &error))?;
+    output::keep(file, path)
 }
 
 /// All that comes before the texels: header, level index, data format descriptor, key/value data, padding.

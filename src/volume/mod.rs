@@ -21,17 +21,29 @@ pub use transfer::{ControlPoint, InvalidTransferFunction, TransferFunction};
 /// DEFLATE turns no byte into more than 1032 (a match of 258 bytes takes at least two bits).
 const MAX_DEFLATE_RATIO: usize = 1032;
 
+/// What the fourth channel of a [`Volume`] holds. It is interpolated as such.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
+pub enum Quantity {
+    /// The opacity, 0..1, of a path of one `opacity_distance`: the medium of the 2005 paper.
+    #[default]
+    Opacity,
+    /// The extinction: the optical depth, at least 0, of a path of one `opacity_distance`. Simulation data are densities.
+    /// Along a ray it is a cubic in each cell, so its integral has a closed form.
+    Extinction,
+}
+
 /// An RGBA 3D texture in texture space (u, v, w).
 ///
-/// Alpha is the opacity, 0..1, of a path of one `opacity_distance`; colour is linear and
-/// premultiplied by alpha. Values between texel centres `(i + 1/2) / n` are linearly interpolated; u and v
+/// Alpha is what [`Quantity`] says; colour is linear and premultiplied by alpha. Values between texel centres `(i + 1/2) / n` are linearly interpolated; u and v
 /// repeat, w clamps to the edge.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Volume {
     /// Texels along u, v, w; each at least 1.
     pub size: [u32; 3],
-    /// `[r a, g a, b a, a]`, u fastest, then v, then w; all finite, alpha in 0..=1, colour at least 0.
+    /// `[r a, g a, b a, a]`, u fastest, then v, then w; all finite and at least 0, an opacity at most 1.
     pub texels: Vec<[f32; 4]>,
+    /// What `a` is.
+    pub quantity: Quantity,
 }
 
 /// A volume and its ever coarser copies; level `l` has `max(1, size >> l)` texels an axis.
@@ -64,7 +76,7 @@ pub enum InvalidVolume {
     #[error(
         "{channel} of texel ({}, {}, {}) is {value}; it must be {}",
         at[0], at[1], at[2],
-        if *channel == Channel::Alpha { "in 0..=1" } else { "finite and at least 0" }
+        if *channel == Channel::Alpha { "in 0..=1, or finite and at least 0 if an extinction" } else { "finite and at least 0" }
     )]
     Value {
         /// The texel's indices along u, v, w.
@@ -101,11 +113,20 @@ impl std::fmt::Display for Channel {
 }
 
 impl Volume {
-    /// A volume of `size` texels along u, v, w, whose `texels` are `[r a, g a, b a, a]`, u fastest.
+    /// A volume of `size` texels along u, v, w, whose `texels` are `[r a, g a, b a, a]`, u fastest, with opacities.
     ///
     /// # Errors
     /// The first of the ranges promised by [`Volume`]'s fields that is broken, and where.
     pub fn new(size: [u32; 3], texels: Vec<[f32; 4]>) -> Result<Self, InvalidVolume> {
+        Self::of(Quantity::Opacity, size, texels)
+    }
+
+    /// The same with opacities or extinctions.
+    ///
+    /// # Errors
+    /// As [`Volume::new`].
+    pub fn of(quantity: Quantity, size: [u32; 3], texels: Vec<[f32; 4]>) -> Result<Self, InvalidVolume> {
+        let most = if quantity == Quantity::Opacity { 1.0 } else { f32::MAX };
         let count = texel_count(size).ok_or(InvalidVolume::Size { size })?;
         if count != texels.len() {
             return Err(InvalidVolume::Count { size, found: texels.len() });
@@ -115,13 +136,13 @@ impl Volume {
                 (Channel::Red, red, red.is_finite() && red >= 0.0),
                 (Channel::Green, green, green.is_finite() && green >= 0.0),
                 (Channel::Blue, blue, blue.is_finite() && blue >= 0.0),
-                (Channel::Alpha, alpha, (0.0..=1.0).contains(&alpha)),
+                (Channel::Alpha, alpha, (0.0..=most).contains(&alpha)),
             ];
             if let Some(&(channel, value, _)) = valid.iter().find(|(.., valid)| !valid) {
                 return Err(InvalidVolume::Value { at: texel_at(size, index), channel, value });
             }
         }
-        Ok(Self { size, texels })
+        Ok(Self { size, texels, quantity })
     }
 
     /// The texel at `(u, v, w)` indices.

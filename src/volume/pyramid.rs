@@ -22,7 +22,7 @@
 
 use rayon::prelude::*;
 
-use super::{Pyramid, Volume};
+use super::{Pyramid, Quantity, Volume};
 
 impl Pyramid {
     /// The pyramid above `volume`: each level is its predecessor with every axis longer than one texel
@@ -62,13 +62,24 @@ fn halved(finer: &Volume, thickness: f64) -> Volume {
             *texel = sum.map(|value| (value / area).min(f64::from(f32::MAX)) as f32);
         }
     });
-    Volume { size, texels }
+    Volume { size, texels, quantity: finer.quantity }
 }
 
 /// The layers under coarse layer `coarse_w` at the fine column `[u, v]`, merged from the top (largest w) down.
 fn merged_column(finer: &Volume, [u, v]: [u32; 2], coarse_w: u32, thickness: f64) -> [f64; 4] {
     if finer.size[2] == 1 {
         return finer.texel([u, v, 0]).map(f64::from);
+    }
+    if finer.quantity == Quantity::Extinction {
+        // Emission and extinction per length: their means keep what a thin path sends out and takes away.
+        let mut sum = [0.0; 4];
+        for (w, weight) in coverage(finer.size[2], coarse_w) {
+            let texel = finer.texel([u, v, w]);
+            for (sum, value) in sum.iter_mut().zip(texel) {
+                *sum += weight * f64::from(value);
+            }
+        }
+        return sum.map(|value| value / texels_per_coarse(finer.size[2]));
     }
     let mut emitted = [0.0; 3];
     let mut depth_above = 0.0_f64;
@@ -171,7 +182,7 @@ mod tests {
     #[test]
     fn every_level_is_a_valid_volume() {
         for size in [[5, 3, 7], [16, 8, 4], [1, 9, 2], [13, 1, 31]] {
-            for Volume { size, texels } in Pyramid::build(random_volume(size)).levels {
+            for Volume { size, texels, .. } in Pyramid::build(random_volume(size)).levels {
                 Volume::new(size, texels).unwrap();
             }
         }

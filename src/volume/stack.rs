@@ -12,8 +12,8 @@ use std::path::{Path, PathBuf};
 use image::{ColorType, DynamicImage, ImageDecoder, ImageFormat, ImageReader};
 
 use super::raw::{check_fits_memory, claimed_size, unreadable};
-use super::sample::linear_from_srgb;
 use super::{AlphaMode, MAX_DEFLATE_RATIO, RawVolume};
+use crate::frame::srgb::linear_from_srgb;
 use crate::{Error, Result};
 
 /// Whether `path` stands for several files: its last part has `*` or `?`, and no file has that very name.

@@ -2,6 +2,8 @@
 
 use serde::Deserialize;
 
+use crate::value::Colour;
+
 /// A piecewise linear map from scalars to straight linear colour and opacity; constant beyond its ends.
 ///
 /// In a scene file:
@@ -10,7 +12,7 @@ use serde::Deserialize;
 /// [volume.transfer]
 /// points = [
 ///     { value = 0, colour = [1, 1, 1], alpha = 0 },
-///     { value = 255, colour = [1, 0.5, 0.2], alpha = 0.8 },
+///     { value = 255, colour = "#ffbc7c", alpha = 0.8 },
 /// ]
 /// ```
 #[derive(Debug, Clone, PartialEq, Deserialize)]
@@ -26,8 +28,8 @@ pub struct ControlPoint {
     /// The scalar, in the units of [`RawVolume::values`](super::RawVolume::values): 0..=255 for an NRRD of
     /// uint8, 0..=1 for KTX2 UNORM and PNG, the number itself for floats.
     pub value: f32,
-    /// Straight linear red, green, blue; at least 0.
-    pub colour: [f32; 3],
+    /// Straight.
+    pub colour: Colour,
     /// The opacity, 0..=1, of a path of one `opacity_distance`.
     pub alpha: f32,
 }
@@ -78,7 +80,7 @@ impl TransferFunction {
             return Err(InvalidTransferFunction::Empty);
         }
         for (index, point) in points.iter().enumerate() {
-            let colour = point.colour.iter().all(|&channel| channel.is_finite() && channel >= 0.0);
+            let colour = point.colour.0.is_finite() && point.colour.0.min_element() >= 0.0;
             if !(colour && point.value.is_finite() && (0.0..=1.0).contains(&point.alpha)) {
                 return Err(InvalidTransferFunction::Range { index });
             }
@@ -93,10 +95,7 @@ impl TransferFunction {
     pub fn straight_rgba(&self, value: f32) -> [f32; 4] {
         let above = self.points.partition_point(|point| point.value <= value);
         let [low, high] = [above.saturating_sub(1), above.min(self.points.len() - 1)].map(|i| self.points[i]);
-        let rgba = |point: ControlPoint| {
-            let [red, green, blue] = point.colour;
-            [red, green, blue, point.alpha]
-        };
+        let rgba = |point: ControlPoint| point.colour.0.extend(point.alpha).to_array();
         if low.value == high.value {
             return rgba(low);
         }
@@ -111,7 +110,7 @@ mod tests {
     use super::*;
 
     fn point(value: f32, red: f32, alpha: f32) -> ControlPoint {
-        ControlPoint { value, colour: [red, 0.0, 0.0], alpha }
+        ControlPoint { value, colour: Colour::linear(red, 0.0, 0.0), alpha }
     }
 
     #[test]
@@ -146,7 +145,7 @@ mod tests {
 
     #[test]
     fn it_is_read_from_toml() {
-        let text = "points = [{ value = 0, colour = [1, 1, 1], alpha = 0 }, { value = 2, colour = [0, 0, 0], alpha = 1 }]";
+        let text = "points = [{ value = 0, colour = [1, 1, 1], alpha = 0 }, { value = 2, colour = '#000000', alpha = 1 }]";
         let map: TransferFunction = toml::from_str(text).unwrap();
         assert_eq!(map.straight_rgba(1.0), [0.5; 4]);
         for wrong in [

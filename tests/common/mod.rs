@@ -11,7 +11,7 @@ use mesoshell::method::{self, Method, Setup};
 use mesoshell::progress::{Interrupt, Progress, Silent};
 use mesoshell::scene::{Camera, March, Medium, Scene, View};
 use mesoshell::shell::{Cell, EXTERIOR, Health, Shell, ShellOptions, Topology};
-use mesoshell::volume::{Pyramid, Volume};
+use mesoshell::volume::{Pyramid, Quantity, Volume};
 
 /// A method under the eyes of the validation layers, synchronization validation included: any message, the device's
 /// end included, fails the test. A test without a Vulkan driver or without the layers fails too, and says what to install.
@@ -58,7 +58,7 @@ pub fn constant_scene(mesh: &Mesh, thickness: f64, alpha: f32, colour: f32, view
     let texel = [colour * alpha, colour * alpha, colour * alpha, alpha];
     Scene {
         shell,
-        volume: Pyramid::build(Volume { size: [1, 1, 1], texels: vec![texel] }),
+        volume: Pyramid::build(Volume { size: [1, 1, 1], texels: vec![texel], quantity: Quantity::Opacity }),
         medium: Medium { opacity_distance: thickness, lod_footprint: 1.0 },
         view,
         march: March::Default { step: 0.5 },

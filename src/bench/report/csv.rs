@@ -41,6 +41,7 @@ pub fn table(results: &Results) -> String {
         let (step, samples) = match point.setting.march {
             March::Default { step } => (step.to_string(), String::new()),
             March::Paper { samples } => (String::new(), samples.to_string()),
+            March::Exact => (String::new(), String::new()),
         };
         let mut line = vec![
             scene.scene.display().to_string(),

@@ -82,11 +82,16 @@ fn section(page: &mut String, scene: &SceneResults, pictures: &Pictures) {
 
 /// What a curve is, and its order of convergence.
 fn legend(curve: &Curve) -> String {
-    let unit = if curve.plan == "paper" { "samples in a tetrahedron" } else { "step in texels" };
-    let order = curve.order.map_or("no order to be seen".to_owned(), |order| {
-        format!("order {order:.2}, of {} points", curve.order_points)
-    });
-    format!("{}, {} plan ({unit}): <b>{order}</b>", escape(&curve.method), escape(&curve.plan))
+    let name = format!("{}, {} plan", escape(&curve.method), escape(&curve.plan));
+    let unit = match curve.plan.as_str() {
+        "default" => " (step in texels)",
+        "paper" => " (samples in a tetrahedron)",
+        _ => "",
+    };
+    match curve.order {
+        Some(order) => format!("{name}{unit}: <b>order {order:.2}</b>, of {} points", curve.order_points),
+        None => format!("{name}{unit}"),
+    }
 }
 
 fn table(page: &mut String, scene: &SceneResults) {

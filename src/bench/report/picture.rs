@@ -4,7 +4,8 @@ use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 
 use crate::frame::Image;
-use crate::frame::file::{linear_from_srgb, write_png};
+use crate::frame::file::write_png;
+use crate::frame::srgb::linear_from_srgb;
 
 /// The longest side of an embedded picture, in pixels.
 const LONGEST_SIDE: u32 = 512;

@@ -151,7 +151,7 @@ fn staircase(front: &[[f64; 2]]) -> String {
 fn mark(svg: &mut String, index: usize, curve: &Curve, point: &Point, [x, y]: [f64; 2]) {
     let fill = if point.pareto { "full" } else { "hollow" };
     let level = point.setting.level();
-    let number = level.split(' ').find(|word| word.parse::<f64>().is_ok()).unwrap_or_default();
+    let number = level.split(' ').find(|word| word.parse::<f64>().is_ok()).unwrap_or(&level);
     // Neighbouring curves have their labels on opposite sides.
     let (dx, dy, anchor) = if index.is_multiple_of(2) { (-9, 15, "end") } else { (9, -8, "start") };
     let _ = writeln!(

@@ -25,6 +25,10 @@ pub(super) struct Grid {
 }
 
 impl Grid {
+    /// One quad with four open sides.
+    pub const OPEN: Self =
+        Self { segments: 1, rings: 1, closed_u: false, closed_v: false, first_pole: false, last_pole: false };
+
     /// Samples `surface`, which maps (u, v) to a position and its unit normal, once a position.
     pub fn mesh(&self, surface: impl Fn(f64, f64) -> (DVec3, DVec3)) -> Mesh {
         let columns = if self.closed_u { self.segments } else { self.segments + 1 };

@@ -33,14 +33,7 @@ impl Plane {
     }
 
     pub(super) fn mesh(&self) -> Mesh {
-        let grid = Grid {
-            segments: self.segments,
-            rings: self.segments,
-            closed_u: false,
-            closed_v: false,
-            first_pole: false,
-            last_pole: false,
-        };
+        let grid = Grid { segments: self.segments, rings: self.segments, ..Grid::OPEN };
         grid.mesh(|u, v| (self.size * DVec3::new(u - 0.5, 0.0, 0.5 - v), DVec3::Y))
     }
 }
@@ -75,14 +68,7 @@ impl Tube {
     }
 
     pub(super) fn mesh(&self) -> Mesh {
-        let grid = Grid {
-            segments: self.segments,
-            rings: self.rings,
-            closed_u: true,
-            closed_v: false,
-            first_pole: false,
-            last_pole: false,
-        };
+        let grid = Grid { segments: self.segments, rings: self.rings, closed_u: true, ..Grid::OPEN };
         grid.mesh(|u, v| {
             let normal = around(u);
             (self.radius * normal + self.height * (v - 0.5) * DVec3::Y, normal)
@@ -121,9 +107,9 @@ impl Sphere {
             segments: self.segments,
             rings: self.rings,
             closed_u: true,
-            closed_v: false,
             first_pole: true,
             last_pole: true,
+            ..Grid::OPEN
         };
         grid.mesh(|u, v| {
             // The sine of pi is not quite 0, but a pole lies exactly on the axis.
@@ -173,14 +159,8 @@ impl Torus {
     }
 
     pub(super) fn mesh(&self) -> Mesh {
-        let grid = Grid {
-            segments: self.segments,
-            rings: self.rings,
-            closed_u: true,
-            closed_v: true,
-            first_pole: false,
-            last_pole: false,
-        };
+        let grid =
+            Grid { segments: self.segments, rings: self.rings, closed_u: true, closed_v: true, ..Grid::OPEN };
         grid.mesh(|u, v| {
             let normal = (TAU * v).cos() * around(u) + (TAU * v).sin() * DVec3::Y;
             (self.major_radius * around(u) + self.minor_radius * normal, normal)

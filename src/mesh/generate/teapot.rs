@@ -152,10 +152,8 @@ impl Teapot {
     }
 
     pub(super) fn mesh(&self) -> Mesh {
-        let mut body = tube(self.segments, self.body_rings);
-        body.first_pole = true;
-        let mut lid = tube(self.segments, self.lid_rings);
-        lid.last_pole = true;
+        let body = Grid { first_pole: true, ..tube(self.segments, self.body_rings) };
+        let lid = Grid { last_pole: true, ..tube(self.segments, self.lid_rings) };
         let handle = tube(self.handle_segments, self.handle_rings);
         let spout = tube(self.spout_segments, self.spout_rings);
 

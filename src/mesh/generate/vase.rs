@@ -56,9 +56,8 @@ impl Vase {
             segments: self.segments,
             rings: self.rings,
             closed_u: true,
-            closed_v: false,
             first_pole: true,
-            last_pole: false,
+            ..Grid::OPEN
         };
         grid.mesh(|u, v| {
             let (point, tangent) = profile(parameter_at(&lengths, v));

@@ -13,7 +13,7 @@ use std::sync::Arc;
 
 use bytemuck::{Pod, Zeroable};
 
-use self::seen::{Cell, Run, Seen, Tile};
+use self::seen::{Run, Seen};
 use super::{Method, Setup};
 use crate::Result;
 use crate::frame::{Frame, Image, Report, Stopwatch};
@@ -21,6 +21,7 @@ use crate::gpu::{Batch, Buffer, Draw, Gpu, Pipeline, PipelineInfo, Target, Textu
 use crate::order::{Sorted, Sorter};
 use crate::progress::{Interrupt, Progress};
 use crate::scene::{March, Scene, View};
+use crate::volume::Quantity;
 
 /// The push constants of `glsl/include/shell.glsl`: see there for each member.
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
@@ -135,16 +136,13 @@ impl Method for Shell {
         self.interrupt.check()?;
         self.progress.stage("marching");
         let batches: Vec<Batch<'_>> = seen.runs.iter().map(|run| canvas.batch(run)).collect();
-        let times = draw(
-            &self.gpu,
-            &Draw {
-                target: &canvas.target,
-                buffers: &[&canvas.cells, &canvas.tiles, &canvas.members],
-                textures: &[&self.volume],
-                push_constants: bytemuck::bytes_of(&constants(&self.scene, view)),
-                batches: &batches,
-            },
-        )?;
+        let times = draw(&Draw {
+            target: &canvas.target,
+            buffers: &[&canvas.cells, &canvas.tiles, &canvas.members],
+            textures: &[&self.volume],
+            push_constants: bytemuck::bytes_of(&constants(&self.scene, view)),
+            batches: &batches,
+        })?;
         watch.lap("march");
         if let Some(times) = times {
             watch.add("march.device", times.draw);
@@ -166,27 +164,24 @@ impl Method for Shell {
 }
 
 impl Shell {
-    /// The canvas for this frame, with what was seen in its buffers: the one of the frame before, where it fits.
+    /// The canvas for this frame, with what was seen in its buffers: the one of the frame before, where it is of that kind.
     fn canvas(&self, kept: Option<Canvas>, kind: CanvasKind, seen: &Seen) -> Result<Canvas> {
-        let fits = |canvas: &Canvas| {
-            canvas.kind == kind
-                && canvas.cells.capacity::<Cell>() >= seen.cells.len()
-                && canvas.tiles.capacity::<Tile>() >= seen.tiles.len()
-                && canvas.members.capacity::<u32>() >= seen.members.len()
-        };
-        let Some(mut canvas) = kept.filter(fits) else {
+        let Some(mut canvas) = kept.filter(|canvas| canvas.kind == kind) else {
             return self.new_canvas(kind, seen);
         };
-        canvas.cells.write(&seen.cells);
-        canvas.tiles.write(&seen.tiles);
-        canvas.members.write(&seen.members);
+        canvas.cells.refill(&seen.cells)?;
+        canvas.tiles.refill(&seen.tiles)?;
+        canvas.members.refill(&seen.members)?;
         Ok(canvas)
     }
 
     fn new_canvas(&self, kind: CanvasKind, seen: &Seen) -> Result<Canvas> {
         let target = Target::new(&self.gpu, kind.width, kind.height, if kind.depth { 2 } else { 1 })?;
-        let constants =
-            [u32::from(matches!(self.scene.march, March::Paper { .. })), u32::from(kind.minified)];
+        let constants = [
+            plan(self.scene.march),
+            u32::from(kind.minified),
+            u32::from(self.scene.volume.levels[0].quantity == Quantity::Extinction),
+        ];
         let pipeline = |vertex, fragment| {
             let info = PipelineInfo {
                 vertex,
@@ -252,11 +247,25 @@ impl Shell {
     }
 }
 
+/// Texels a sample in cycles under the exact plan.
+const CYCLE_STEP: f64 = 0.125;
+
+/// The specialisation constant `PLAN` of `glsl/include/march.glsl`.
+fn plan(march: March) -> u32 {
+    match march {
+        March::Default { .. } => 0,
+        March::Paper { .. } => 1,
+        March::Exact => 2,
+    }
+}
+
 fn constants(scene: &Scene, view: &View) -> ViewConstants {
     let pixel = view.pixel_at_unit_depth();
     let (step, samples) = match scene.march {
         March::Paper { samples } => (1.0, samples),
         March::Default { step } => (step, 1),
+        // Of cycles alone, which are always marched by midpoints.
+        March::Exact => (CYCLE_STEP, 1),
     };
     ViewConstants {
         centre: [0.5 * view.width as f32, 0.5 * view.height as f32],

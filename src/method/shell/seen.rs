@@ -75,8 +75,9 @@ impl Seen {
             .sequence
             .par_iter()
             .map(|&t| {
-                let exit_faces = sorted.exit_faces[t as usize];
-                (exit_faces != 0).then(|| eye.cell(t as usize, exit_faces))
+                let (t, exit_faces) = (t as usize, sorted.exit_faces[t as usize]);
+                let has_volume = exit_faces != 0 && scene.shell.cells[t].has_maps();
+                has_volume.then(|| eye.cell(t, exit_faces))
             })
             .collect();
         let mut seen = Self { cells: Vec::with_capacity(found.len()), ..Self::default() };
@@ -99,6 +100,9 @@ impl Seen {
 
     fn add_cycle(&mut self, found: &[Found], view: &View) {
         let added = self.add(found);
+        if added.is_empty() {
+            return;
+        }
         let first_tile = self.tiles.len() as u32;
         let columns = view.width.div_ceil(TILE);
         let size = [f64::from(view.width), f64::from(view.height)];

@@ -9,8 +9,9 @@ use rayon::prelude::*;
 
 use super::Pattern;
 use super::grid::{Grid, premultiplied, smoothstep};
-use super::keys::{Colour, keys, srgb};
+use super::keys::keys;
 use super::noise::Octaves;
+use crate::value::Colour;
 
 keys! {
     /// The keys of `recipe = "clouds"`.
@@ -34,9 +35,9 @@ keys! {
         /// How dark the clouds grow towards their bottoms.
         shade: f32 = 0.85, 0.0..=1.0;
         /// Colour of the tops.
-        top_colour: Colour = srgb(0xffffff);
+        top_colour: Colour = Colour::srgb(0xffffff);
         /// Colour where no light comes through.
-        bottom_colour: Colour = srgb(0x5f6b80);
+        bottom_colour: Colour = Colour::srgb(0x5f6b80);
     }
 }
 

@@ -4,8 +4,9 @@ use glam::Vec3;
 
 use super::Pattern;
 use super::grid::{Grid, premultiplied, smoothstep};
-use super::keys::{Colour, keys, srgb};
+use super::keys::keys;
 use super::noise::{Octaves, gradient};
+use crate::value::Colour;
 
 keys! {
     /// The keys of `recipe = "fog"`.
@@ -23,9 +24,9 @@ keys! {
         /// How high the fog reaches, as a share of the shell's thickness.
         reach: f32 = 0.95, 0.05..=1.0;
         /// Colour where the fog is thick.
-        colour: Colour = srgb(0xf2f4f7);
+        colour: Colour = Colour::srgb(0xf2f4f7);
         /// Colour of the thin wisps.
-        wisp_colour: Colour = srgb(0xc3cfdf);
+        wisp_colour: Colour = Colour::srgb(0xc3cfdf);
     }
 }
 

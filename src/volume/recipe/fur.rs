@@ -13,8 +13,9 @@ use rayon::prelude::*;
 
 use super::Pattern;
 use super::grid::{Grid, lay_over, smoothstep};
-use super::keys::{Colour, keys, srgb};
+use super::keys::keys;
 use super::noise::{gradient, nearest_feature, random};
+use crate::value::Colour;
 
 keys! {
     /// The keys of `recipe = "fur"`.
@@ -48,13 +49,13 @@ keys! {
         /// How dark the fur is at its roots: 0 as bright as at the tips, 1 black.
         occlusion: f32 = 0.9, 0.0..=1.0;
         /// Colour at the root.
-        root_colour: Colour = srgb(0x6e3f20);
+        root_colour: Colour = Colour::srgb(0x6e3f20);
         /// Colour at the tip.
-        tip_colour: Colour = srgb(0xf6cc92);
+        tip_colour: Colour = Colour::srgb(0xf6cc92);
         /// How much strands differ in brightness.
         colour_variation: f32 = 0.5, 0.0..=1.0;
         /// Colour of the skin.
-        skin_colour: Colour = srgb(0x2a1a10);
+        skin_colour: Colour = Colour::srgb(0x2a1a10);
     }
 }
 

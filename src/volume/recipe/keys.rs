@@ -1,6 +1,5 @@
 //! The keys of a recipe file: what they are called, what they mean, their defaults and their ranges.
 
-use glam::Vec3;
 use serde::Deserialize;
 
 /// A struct whose fields are the keys of a recipe, each told once: its meaning, default and range.
@@ -51,29 +50,3 @@ macro_rules! keys {
     };
 }
 pub(super) use keys;
-
-/// A colour, written `"#rrggbb"` in sRGB as colour pickers give it, and kept in linear light.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
-#[serde(try_from = "String")]
-pub struct Colour(pub Vec3);
-
-/// The colour `0xrrggbb`.
-pub(super) fn srgb(hex: u32) -> Colour {
-    let linear = |shift: u32| {
-        let encoded = (hex >> shift & 0xff) as f32 / 255.;
-        if encoded <= 0.04045 { encoded / 12.92 } else { ((encoded + 0.055) / 1.055).powf(2.4) }
-    };
-    Colour(Vec3::new(linear(16), linear(8), linear(0)))
-}
-
-impl TryFrom<String> for Colour {
-    type Error = String;
-
-    fn try_from(text: String) -> Result<Self, String> {
-        text.strip_prefix('#')
-            .filter(|digits| digits.len() == 6 && digits.bytes().all(|digit| digit.is_ascii_hexdigit()))
-            .and_then(|digits| u32::from_str_radix(digits, 16).ok())
-            .map(srgb)
-            .ok_or_else(|| format!("`{text}` is not a colour such as \"#c8955a\""))
-    }
-}

@@ -7,7 +7,8 @@
 //! density = 4000
 //! ```
 //!
-//! [`Header`] lists the keys that every recipe has; [`Fog`], [`Fur`] and the others list their own. A recipe
+//! [`Header`] lists the keys that every recipe has; [`Fog`], [`Fur`] and the others list their own. Colours are written
+//! `"#rrggbb"` (sRGB) or `[red, green, blue]` (linear): see [`Colour`](crate::value::Colour). A recipe
 //! yields the same bytes whatever the number of threads, and its volume repeats in u and v without a seam.
 
 mod clouds;
@@ -32,11 +33,11 @@ use toml::de::{DeTable, DeValue, ValueDeserializer};
 pub use clouds::Clouds;
 pub use fog::Fog;
 pub use fur::Fur;
-pub use keys::Colour;
 pub use rocks::Rocks;
 pub use weave::Weave;
 
-use super::Volume;
+use super::{Quantity, Volume};
+use crate::value::exactly;
 use crate::{Error, Result};
 use grid::Grid;
 use keys::{Keys, keys};
@@ -67,6 +68,7 @@ keys! {
         /// Which recipe: `"fur"`, `"fog"`, ... Must be given.
         recipe: String = String::new();
         /// Texels along u, v, w; each at least 1, all together at most [`MAX_TEXELS`].
+        #[serde(deserialize_with = "exactly")]
         size: [u32; 3] = [128, 128, 32];
         /// Another seed gives another volume of the same kind.
         seed: u32 = 1;
@@ -147,7 +149,7 @@ impl Recipe {
         texels.resize(count, [0.; 4]);
         let grid = Grid { size: size.map(|n| n as usize), height: self.header.height };
         self.pattern.draw(&grid, self.header.seed, &mut texels);
-        Ok(Volume { size, texels })
+        Ok(Volume { size, texels, quantity: Quantity::Opacity })
     }
 }
 

@@ -11,8 +11,9 @@ use rand_pcg::Pcg32;
 
 use super::Pattern;
 use super::grid::{Grid, lay_over, smoothstep};
-use super::keys::{Colour, keys, srgb};
+use super::keys::keys;
 use super::noise::Octaves;
+use crate::value::Colour;
 
 keys! {
     /// The keys of `recipe = "rocks"`.
@@ -38,13 +39,13 @@ keys! {
         /// How much the stones are mottled.
         mottling: f32 = 0.6, 0.0..=1.0;
         /// Colour of the lightest stones; the others lie between this and `dark_colour`.
-        light_colour: Colour = srgb(0xb9b2a4);
+        light_colour: Colour = Colour::srgb(0xb9b2a4);
         /// Colour of the darkest stones.
-        dark_colour: Colour = srgb(0x6f675f);
+        dark_colour: Colour = Colour::srgb(0x6f675f);
         /// The colour of some of the stones.
-        accent_colour: Colour = srgb(0x96785e);
+        accent_colour: Colour = Colour::srgb(0x96785e);
         /// Colour of the ground.
-        ground_colour: Colour = srgb(0x4b3d2e);
+        ground_colour: Colour = Colour::srgb(0x4b3d2e);
     }
 }
 

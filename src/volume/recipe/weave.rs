@@ -9,8 +9,9 @@ use glam::{Vec2, Vec3};
 
 use super::Pattern;
 use super::grid::{Grid, lay_over, smoothstep};
-use super::keys::{Colour, keys, srgb};
+use super::keys::keys;
 use super::noise::{gradient, random};
+use crate::value::Colour;
 
 keys! {
     /// The keys of `recipe = "weave"`.
@@ -32,9 +33,9 @@ keys! {
         /// Opacity inside a thread.
         opacity: f32 = 1.0, 0.0..=1.0;
         /// Colour of the threads along v.
-        warp_colour: Colour = srgb(0x2f5d8a);
+        warp_colour: Colour = Colour::srgb(0x2f5d8a);
         /// Colour of the threads along u.
-        weft_colour: Colour = srgb(0xd9c7a3);
+        weft_colour: Colour = Colour::srgb(0xd9c7a3);
     }
 }
 

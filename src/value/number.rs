@@ -1,7 +1,10 @@
-//! Numbers that cannot hold a value out of their range: what a scene file's keys are made of.
+//! Numbers that cannot hold a value out of their range.
 
 use serde::Deserialize;
+use serde::de::value::I64Deserializer;
 use serde::de::{Deserializer, Error, Unexpected, Visitor};
+
+use super::Exactly;
 
 /// Declares a number whose range is checked as it is read; the second line says the range in words.
 macro_rules! number {
@@ -106,26 +109,24 @@ count! {
     Runs = 1..=1000
 }
 
-/// A list of exactly `N` values. (Serde's own arrays let a list be longer.)
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
-#[serde(try_from = "Vec<T>", bound = "T: Deserialize<'de>")]
-pub struct Exactly<const N: usize, T>(pub [T; N]);
-
-impl<const N: usize, T> TryFrom<Vec<T>> for Exactly<N, T> {
-    type Error = String;
-
-    fn try_from(list: Vec<T>) -> Result<Self, String> {
-        let values = list.try_into();
-        values
-            .map(Self)
-            .map_err(|list: Vec<T>| format!("invalid length {}, expected a list of {N}", list.len()))
-    }
-}
-
 /// Width and height of a picture that fits into memory: at most 2^28 pixels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(try_from = "Exactly<2, Pixels>")]
 pub struct PictureSize(pub [Pixels; 2]);
+
+impl PictureSize {
+    /// The size of so many pixels.
+    ///
+    /// # Errors
+    /// What is out of range, in words.
+    pub fn new(width: u32, height: u32) -> Result<Self, String> {
+        let side = |pixels: u32| {
+            let pixels = I64Deserializer::<serde::de::value::Error>::new(pixels.into());
+            Pixels::deserialize(pixels).map_err(|error| error.to_string())
+        };
+        Ok(Exactly([side(width)?, side(height)?]).try_into()?)
+    }
+}
 
 impl TryFrom<Exactly<2, Pixels>> for PictureSize {
     type Error = &'static str;

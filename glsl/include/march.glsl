@@ -1,0 +1,130 @@
+// Quadrature of `integral of T sigma c` along one ray in one tetrahedron.
+
+const uint PLAN_DEFAULT = 0; // midpoints, spread by length
+const uint PLAN_PAPER = 1;   // midpoints, as many in every tetrahedron
+const uint PLAN_EXACT = 2;   // Gauss in each voxel
+
+// What a ray has gathered, front to back.
+struct Light {
+    vec4 rgba;           // premultiplied
+    float transmittance;
+    float depth;         // integral of T sigma z dz, in depth along the ray
+};
+
+// Below this an alpha counts as none: quotients of denormal numbers are not numbers where they are flushed to zero.
+const float LEAST = 1e-30;
+
+// Straight colour times `amount` of opacity, of a texel whose colour is premultiplied by its own alpha or extinction.
+vec3 emitted(vec4 texel, float amount) {
+    return texel.a > LEAST ? texel.rgb * (amount / texel.a) : vec3(0.0);
+}
+
+// Midpoint rule: the texture is constant over a step, and the exponential is exact.
+void march_midpoints(Path path, vec2 segment, float per_depth, uint count, inout Light light) {
+    float step = (segment.y - segment.x) / float(count);
+    for (uint i = 0; i < count; i++) {
+        float z = segment.x + (float(i) + 0.5) * step;
+        vec4 texel = fetch(path, z);
+        float optical = extinction(texel) * max(step * per_depth, LEAST);
+        float alpha = opacity(optical);
+        light.rgba += light.transmittance * vec4(emitted(texel, alpha), alpha);
+        light.depth += light.transmittance * alpha * z;
+        light.transmittance *= exp(-optical);
+    }
+}
+
+// Depths at which the ray crosses planes of texel centres of a level: the next one on each axis, and their distance.
+struct Lattice {
+    vec3 next;
+    vec3 spacing;
+};
+
+Lattice lattice_of(Path path, float level, float from) {
+    vec3 size = max(floor(view.texels * exp2(-level)), vec3(1.0));
+    vec3 place = (path.at_eye + from * path.from_depth) * size - 0.5;
+    vec3 speed = path.from_depth * size;
+    vec3 ahead = mix(place - floor(place), 1.0 - (place - floor(place)), greaterThan(speed, vec3(0.0)));
+    // A ray along an axis' planes never crosses them: 3e38 then, from the division by the least normal number.
+    vec3 spacing = min(1.0 / max(abs(speed), vec3(1.2e-38)), vec3(3.0e38));
+    return Lattice(from + ahead * spacing, spacing);
+}
+
+float first(vec3 a) {
+    return min(a.x, min(a.y, a.z));
+}
+
+void pass(inout Lattice lattice, float depth) {
+    lattice.next += mix(vec3(0.0), lattice.spacing, lessThanEqual(lattice.next, vec3(depth)));
+}
+
+// Three-point Gauss-Legendre on 0..1, and the integral of the cubic through the start and the three nodes from the start to
+// each node: rows of nodes, columns of samples. A cubic's optical depth comes out exact.
+const vec3 GAUSS_NODES = vec3(0.11270166537925831, 0.5, 0.88729833462074169);
+const vec3 GAUSS_WEIGHTS = vec3(5.0, 8.0, 5.0) / 18.0;
+const vec3 CUMULATIVE_START = vec3(0.05, -0.0625, 0.05);
+const mat3 CUMULATIVE = mat3(0.064947361003827059, 0.39269010483719180, 0.19404680587740725,
+                             -0.0026433341916055684, 0.18055555555555552, 0.51375444530271663,
+                             0.00039763856703680002, -0.010745660392747408, 0.12949708344061736);
+
+// One piece of a ray within one cell of texel centres, where the texture is a cubic. `start` is the texel value's
+// extinction at its beginning. Returns that at its end.
+void march_piece(Path path, float from, float to, float per_depth, float start, inout Light light) {
+    float h = to - from;
+    if (!(h > 0.0)) return; // a sixteenth of some roundings
+    vec3 z = from + h * GAUSS_NODES;
+    vec4 texels[3] = vec4[](fetch(path, z.x), fetch(path, z.y), fetch(path, z.z));
+    vec3 sigma = vec3(extinction(texels[0]), extinction(texels[1]), extinction(texels[2])) * per_depth;
+    float whole = h * dot(GAUSS_WEIGHTS, sigma);
+    vec3 until = h * (CUMULATIVE_START * start * per_depth + CUMULATIVE * sigma);
+    // Optical depths up to the nodes rise from 0 to the whole; of an opacity near 1, which is no cubic, the interpolant may not.
+    until = clamp(until, vec3(0.0), vec3(whole));
+    vec3 amount = h * GAUSS_WEIGHTS * sigma * exp(-until);
+    float alpha = opacity(whole);
+    if (whole < 3.0e38) {
+        // The proportions are Gauss's, but the sum is the exact opacity: nothing is gained or lost, however dense.
+        float sum = amount.x + amount.y + amount.z;
+        amount *= sum > LEAST ? alpha / sum : 0.0;
+    } else {
+        // The ray ends at the first node where alpha is 1.
+        bvec3 wall = greaterThan(sigma, vec3(3.0e38));
+        amount = alpha * (wall.x ? vec3(1.0, 0.0, 0.0) : wall.y ? vec3(0.0, 1.0, 0.0) : vec3(0.0, 0.0, 1.0));
+    }
+    light.rgba += light.transmittance * vec4(emitted(texels[0], amount.x) + emitted(texels[1], amount.y)
+                                             + emitted(texels[2], amount.z), alpha);
+    light.depth += light.transmittance * dot(amount, z);
+    light.transmittance *= exp(-whole);
+}
+
+// Goes from plane to plane of texel centres, of both levels that are blended; dense pieces are cut further.
+void march_exactly(Path path, vec2 segment, float per_depth, inout Light light) {
+    float level = MINIFIED ? floor(level_of_detail(path, 0.5 * (segment.x + segment.y))) : 0.0;
+    Lattice fine = lattice_of(path, level, segment.x);
+    Lattice coarse = lattice_of(path, min(level + 1.0, view.last_level), segment.x);
+    float from = segment.x;
+    float start = extinction(fetch(path, from));
+    while (from < segment.y && light.transmittance > 1e-7) {
+        float to = min(segment.y, first(fine.next));
+        if (MINIFIED) to = min(to, first(coarse.next));
+        pass(fine, to);
+        if (MINIFIED) pass(coarse, to);
+        if (!(to > from)) continue;
+        float end = extinction(fetch(path, to));
+        // Gauss errs by depth^6 / 2e6 of the piece's light: 2^-24 at an optical depth of two thirds.
+        float optical = max(start, end) * (to - from) * per_depth;
+        uint parts = uint(clamp(ceil(1.5 * optical), 1.0, 16.0));
+        float part = (to - from) / float(parts);
+        for (uint i = 0; i < parts; i++) {
+            float a = from + float(i) * part;
+            if (i > 0) start = extinction(fetch(path, a));
+            march_piece(path, a, i + 1 == parts ? to : a + part, per_depth, start, light);
+        }
+        start = end;
+        from = to;
+    }
+}
+
+// A wall stops the ray however short the step: `LEAST` keeps infinity times nothing from being no number.
+void march(Path path, vec2 segment, float per_depth, inout Light light) {
+    if (PLAN == PLAN_EXACT) march_exactly(path, segment, max(per_depth, LEAST), light);
+    else march_midpoints(path, segment, per_depth, sample_count(path, segment.x, segment.y), light);
+}

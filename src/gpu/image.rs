@@ -1,0 +1,85 @@
+//! Images in device memory.
+
+use std::mem::ManuallyDrop;
+use std::sync::Arc;
+
+use ash::vk;
+use gpu_allocator::MemoryLocation;
+use gpu_allocator::vulkan::Allocation;
+
+use super::device::{Gpu, vulkan_error};
+use super::memory::{allocate, free};
+use crate::Result;
+
+/// An image with its memory and one view of all of it.
+#[derive(Debug)]
+pub(super) struct DeviceImage {
+    pub(super) raw: vk::Image,
+    pub(super) view: vk::ImageView,
+    allocation: ManuallyDrop<Allocation>,
+    gpu: Arc<Gpu>,
+}
+
+impl DeviceImage {
+    /// An image as `info` says, in device memory; the caller has checked that the device has such images.
+    pub(super) fn new(
+        gpu: &Arc<Gpu>,
+        name: &str,
+        info: &vk::ImageCreateInfo<'_>,
+        view_type: vk::ImageViewType,
+    ) -> Result<Self> {
+        // SAFETY: the caller checked sides against the limits, and the format against its features.
+        let raw = unsafe { gpu.raw.create_image(info, None) }
+            .map_err(|error| vulkan_error(&format!("creating the image of {name}"), error))?;
+        // SAFETY: `raw` was just made by this device.
+        let requirements = unsafe { gpu.raw.get_image_memory_requirements(raw) };
+        let allocation = match allocate(gpu, name, requirements, MemoryLocation::GpuOnly, false) {
+            Ok(allocation) => allocation,
+            Err(error) => {
+                // SAFETY: nothing uses the image yet.
+                unsafe { gpu.raw.destroy_image(raw, None) };
+                return Err(error);
+            }
+        };
+        let mut image = Self {
+            raw,
+            view: vk::ImageView::null(),
+            allocation: ManuallyDrop::new(allocation),
+            gpu: gpu.clone(),
+        };
+        // SAFETY: the allocation meets the image's requirements and is bound once.
+        unsafe { gpu.raw.bind_image_memory(raw, image.allocation.memory(), image.allocation.offset()) }
+            .map_err(|error| vulkan_error(&format!("binding the memory of {name}"), error))?;
+        let view_info = vk::ImageViewCreateInfo::default()
+            .image(raw)
+            .view_type(view_type)
+            .format(info.format)
+            .subresource_range(whole());
+        // SAFETY: the view covers the image that was just made.
+        image.view = unsafe { gpu.raw.create_image_view(&view_info, None) }
+            .map_err(|error| vulkan_error(&format!("creating the view of {name}"), error))?;
+        Ok(image)
+    }
+}
+
+impl Drop for DeviceImage {
+    fn drop(&mut self) {
+        // SAFETY: every submission that used the image was waited for; destroying a null view does nothing.
+        unsafe {
+            self.gpu.raw.destroy_image_view(self.view, None);
+            self.gpu.raw.destroy_image(self.raw, None);
+            free(&self.gpu, &mut self.allocation);
+        }
+    }
+}
+
+/// All levels and layers of a colour image.
+pub(super) fn whole() -> vk::ImageSubresourceRange {
+    vk::ImageSubresourceRange {
+        aspect_mask: vk::ImageAspectFlags::COLOR,
+        base_mip_level: 0,
+        level_count: vk::REMAINING_MIP_LEVELS,
+        base_array_layer: 0,
+        layer_count: vk::REMAINING_ARRAY_LAYERS,
+    }
+}
