@@ -320,7 +320,7 @@ mod tests {
         errors.iter().copied().map(f64::from).sum::<f64>() / errors.len() as f64
     }
 
-    /// By the authors' own implementation, flip-evaluator 1.7 of the Python package index, from the pairs laid over
+    /// By the authors' own implementation, the Python package flip-evaluator 1.7, from the pairs laid over
     /// their backgrounds, clamped to 0..=1 and encoded in sRGB as f32: `evaluate(a, b, "LDR", applyMagma=False)`.
     /// Of its map the mean (in f64, since its own adds up in f32), the first pixel and the middle one.
     const EXPECTED: [[f64; 3]; 3] = [
