@@ -114,7 +114,7 @@ pub fn measure(
             reference_milliseconds: reference.milliseconds,
             reference_reused: reference.reused,
             curves: Vec::new(),
-            points: points(subject.settings, &contenders, &reference.image)?,
+            points: points(subject, &contenders, &reference.image)?,
         },
     };
 
@@ -154,9 +154,11 @@ impl Contender {
 }
 
 /// Points without a run. The picture is the same in every run, so that of the warm-up stands for all.
-fn points(settings: &[Setting], contenders: &[Contender], reference: &Image) -> Result<Vec<Point>> {
+fn points(subject: &Subject<'_>, contenders: &[Contender], reference: &Image) -> Result<Vec<Point>> {
+    let background = subject.background.unwrap_or_default();
     let point = |(setting, contender): (&Setting, &Contender)| {
-        Ok(Point::new(setting.clone(), &metric::compare(&contender.warm_up.image, reference)?))
+        let metrics = metric::compare_over(&contender.warm_up.image, reference, background)?;
+        Ok(Point::new(setting.clone(), &metrics))
     };
-    settings.iter().zip(contenders).map(point).collect()
+    subject.settings.iter().zip(contenders).map(point).collect()
 }

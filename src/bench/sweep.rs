@@ -276,8 +276,12 @@ exact = true
         let sweep = parse(SWEEP).unwrap();
         assert_eq!(sweep.scenes, [Path::new("benches/a.toml"), Path::new("benches/../b.toml")]);
         assert_eq!((sweep.size, sweep.runs), (Some([64, 32]), 2));
-        let marches =
-            [March::Default { step: 1.0 }, March::Default { step: 0.5 }, March::Paper { samples: 4 }, March::Exact];
+        let marches = [
+            March::Default { step: 1.0 },
+            March::Default { step: 0.5 },
+            March::Paper { samples: 4 },
+            March::Exact,
+        ];
         let expected = marches.map(|march| Setting { method: "shell".to_owned(), march });
         assert_eq!(sweep.settings, expected);
     }

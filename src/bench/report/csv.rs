@@ -89,12 +89,12 @@ mod tests {
         let lines: Vec<&str> = table.split("\r\n").collect();
         assert_eq!(
             lines[0],
-            "scene,width,height,method,plan,step,samples,runs,median_ms,p95_ms,pareto,rmse,p999,max,psnr,order_ms,\
+            "scene,width,height,method,plan,step,samples,runs,median_ms,p95_ms,pareto,rmse,p999,max,psnr,flip,order_ms,\
              order.search_ms,march_ms"
         );
         assert_eq!(
             lines[2],
-            "\"a, \"\"b\"\".toml\",2,2,shell,default,0.5,,2,20.5,21,true,0.0025,0,0,inf,2,1,18.5"
+            "\"a, \"\"b\"\".toml\",2,2,shell,default,0.5,,2,20.5,21,true,0.0025,0,0,inf,0,2,1,18.5"
         );
         assert_eq!(lines[4].split(',').nth(7), Some("1"), "the samples: {}", lines[4]);
         assert_eq!((lines.len(), lines[5]), (6, ""));
