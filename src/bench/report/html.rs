@@ -157,7 +157,7 @@ fn gallery(page: &mut String, scene: &SceneResults, pictures: &Pictures) {
         let image = thumbnail(image);
         shown(page, &image, pictures.background, &format!("{title}: {level}"));
         *page += "</figure>\n";
-        let ErrorMap { image: map, range } = error_map(&image, &reference);
+        let ErrorMap { image: map, range } = error_map(&image, &reference, pictures.background);
         shown(page, &map, None, &format!("its error in luminance: {level}"));
         let _ = writeln!(
             page,
@@ -228,7 +228,7 @@ mod tests {
     fn all_that_was_measured_is_told() {
         let page = page(&results(), &[pictures()]);
         let parts =
-            ["order 2.00, of 3 points", "no order to be seen", "2.5e-3", "20.5", "a &lt;device&gt;", "1.2 s"];
+            ["<b>order 2.00</b>, of 3 points", "paper plan (samples", "2.5e-3", "20.5", "a &lt;device&gt;", "1.2 s"];
         for part in parts.into_iter().chain(["fog &amp; fur", "step 0.25", "1 sample", "+5e-1", "march (ms)"])
         {
             assert!(page.contains(part), "{part}");

@@ -6,6 +6,7 @@ use base64::engine::general_purpose::STANDARD;
 use crate::frame::Image;
 use crate::frame::file::write_png;
 use crate::frame::srgb::linear_from_srgb;
+use crate::metric::map::{luminance_differences, natural_range};
 
 /// The longest side of an embedded picture, in pixels.
 const LONGEST_SIDE: u32 = 512;
@@ -49,18 +50,15 @@ pub fn thumbnail(image: &Image) -> Image {
 pub struct ErrorMap {
     /// Red where it is brighter, blue where it is darker, transparent where it is equal.
     pub image: Image,
-    /// The difference that is opaque: the 99.9th percentile of all, rounded up to 1, 2 or 5 times a power of ten; 0 where
-    /// nothing differs.
+    /// The difference that is opaque: the [`natural_range`], rounded up to 1, 2 or 5 times a power of ten.
     pub range: f32,
 }
 
-/// Compares two pictures of one size.
-pub fn error_map(image: &Image, reference: &Image) -> ErrorMap {
-    let pairs = image.rgba.iter().zip(&reference.rgba);
-    let differences: Vec<f32> = pairs.map(|(a, b)| luminance(a) - luminance(b)).collect();
-    let mut sizes: Vec<f32> = differences.iter().map(|difference| difference.abs()).collect();
-    sizes.sort_by(f32::total_cmp);
-    let range = rounded_up(sizes[sizes.len() - 1 - sizes.len() / 1000]);
+/// Compares two pictures of one size, both over `background`, or black.
+pub fn error_map(image: &Image, reference: &Image, background: Option<[f32; 3]>) -> ErrorMap {
+    let differences = luminance_differences(image, reference, background.unwrap_or_default());
+    let differences = differences.expect("pictures of one scene have one size");
+    let range = rounded_up(natural_range(&differences));
     let colour = |difference: &f32| {
         let end = if *difference < 0.0 { TOO_DARK } else { TOO_BRIGHT };
         let alpha = if range > 0.0 { (difference.abs() / range).min(1.0) } else { 0.0 };
@@ -69,11 +67,6 @@ pub fn error_map(image: &Image, reference: &Image) -> ErrorMap {
     };
     let rgba = differences.iter().map(colour).collect();
     ErrorMap { image: Image { width: image.width, height: image.height, rgba }, range }
-}
-
-/// Rec. 709, of linear premultiplied RGB.
-fn luminance(&[r, g, b, _]: &[f32; 4]) -> f32 {
-    0.2126 * r + 0.7152 * g + 0.0722 * b
 }
 
 /// To 1, 2 or 5 times a power of ten; what is not positive or not finite to 0.
@@ -99,15 +92,15 @@ mod tests {
             *pixel = [0.2, 0.2, 0.2, 1.0];
         }
         image.rgba[1500] = [0.65, 0.65, 0.65, 1.0];
-        let map = error_map(&image, &reference);
+        let map = error_map(&image, &reference, None);
         assert_eq!(map.range, 0.5);
         let [r, _, b, alpha] = map.image.rgba[0];
         assert!((alpha - 0.6).abs() < 1e-6 && b > r, "dark is blue");
         let [r, _, b, alpha] = map.image.rgba[1500];
         assert!((alpha - 0.3).abs() < 1e-6 && r > b, "bright is red");
         assert_eq!(map.image.rgba[1999], [0.0; 4]);
-        let same = error_map(&image, &image);
-        assert!(same.range == 0.0 && same.image.rgba.iter().all(|pixel| *pixel == [0.0; 4]));
+        let same = error_map(&image, &image, None);
+        assert!(same.range == 1.0 && same.image.rgba.iter().all(|pixel| *pixel == [0.0; 4]));
     }
 
     #[test]
