@@ -152,10 +152,10 @@ fn diff_tells_images_apart() {
         assert!(desk.run(&[RENDER, &["-q", "-o", name, "-D", thickness]].concat()).status.success());
     }
     let code = |arguments: &[&str]| desk.run(arguments).status.code();
-    assert_eq!(code(&["diff", "a.exr", "a.exr", "--max-rmse", "0"]), Some(0));
+    assert_eq!(code(&["diff", "a.exr", "a.exr", "--threshold", "0"]), Some(0));
     assert_eq!(code(&["diff", "a.exr", "b.exr"]), Some(0));
-    assert_eq!(code(&["diff", "a.exr", "b.exr", "--max-rmse", "1e-3"]), Some(1));
-    assert_eq!(code(&["diff", "a.exr", "b.exr", "--max-rmse", "nan"]), Some(1));
+    assert_eq!(code(&["diff", "a.exr", "b.exr", "--threshold", "1e-3"]), Some(1));
+    assert_eq!(code(&["diff", "a.exr", "b.exr", "--threshold", "nan"]), Some(1));
     let output = desk.run(&["diff", "a.exr", "b.exr", "--json"]);
     let value: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
     assert_eq!(value["pixels"], 256);

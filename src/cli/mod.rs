@@ -19,7 +19,7 @@ use clap::{Args, Parser, Subcommand};
 const EXIT_CODES: &str = "\
 Exit codes:
   0    done
-  1    diff: the images differ by more than --max-rmse
+  1    diff: the images differ by more than --threshold
   2    the request makes no sense (an unknown option, a bad -D)
   3    an input file is missing, damaged or means something impossible
   4    no usable Vulkan device

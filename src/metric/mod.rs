@@ -1,14 +1,19 @@
 //! Image error: how far one linear premultiplied RGBA image is from another.
 //!
 //! Channels are compared as they are, in linear light and without a tone curve, so that a number means
-//! the same in the dark as in the light, and a change of hue counts as much as one of brightness.
+//! the same in the dark as in the light, and a change of hue counts as much as one of brightness. [`flip`] alone
+//! judges as a person does.
+
+pub mod flip;
+mod magma;
+pub mod map;
 
 use serde::Serialize;
 
 use crate::frame::Image;
 use crate::{Error, Result};
 
-/// The differences between two images, in units of linear premultiplied RGBA (1 is white).
+/// The differences between two images, in units of linear premultiplied RGBA (1 is white) but for PSNR and FLIP.
 ///
 /// A value that is not finite in either image counts as an infinite difference, even from itself.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -22,25 +27,26 @@ pub struct Metrics {
     pub p999: f64,
     /// Peak signal to noise ratio for a peak of 1, in decibels: `-20 log10(rmse)`; infinite for equal images.
     pub psnr: f64,
+    /// The mean FLIP error of the pixels, 0 to 1: see [`flip`].
+    pub flip: f64,
     /// Pixels compared.
     pub pixels: u64,
 }
 
-/// Compares two images; neither is preferred.
+/// Compares two images, for FLIP over black; neither is preferred.
 ///
 /// # Errors
 /// [`Error::Usage`] when their sizes differ, or when they have no pixels.
 pub fn compare(a: &Image, b: &Image) -> Result<Metrics> {
-    let sizes = [(a.width, a.height, a.rgba.len()), (b.width, b.height, b.rgba.len())];
-    if sizes[0] != sizes[1] || a.rgba.is_empty() {
-        let message = format!(
-            "images of {}x{} and {}x{} pixels cannot be compared",
-            a.width, a.height, b.width, b.height
-        );
-        let help = Some("render both at the same size, of at least one pixel".into());
-        return Err(Error::Usage { message, help });
-    }
+    compare_over(a, b, [0.0; 3])
+}
 
+/// As [`compare`], for FLIP over `background` (linear RGB).
+///
+/// # Errors
+/// As [`compare`].
+pub fn compare_over(a: &Image, b: &Image, background: [f32; 3]) -> Result<Metrics> {
+    check_sizes(a, b)?;
     let mut sum_of_squares = 0.0;
     let mut largest: Vec<f64> = Vec::with_capacity(a.rgba.len());
     for (a, b) in a.rgba.iter().zip(&b.rgba) {
@@ -51,11 +57,37 @@ pub fn compare(a: &Image, b: &Image) -> Result<Metrics> {
     let pixels = largest.len();
     let rmse = (sum_of_squares / (4 * pixels) as f64).sqrt();
 
-    // Nearest rank: the smallest difference that at least 99.9 % of the pixels do not exceed.
-    let rank = pixels - pixels / 1000;
-    let (_, &mut p999, _) = largest.select_nth_unstable_by(rank - 1, f64::total_cmp);
+    let p999 = percentile_999(&mut largest);
     let max = largest.into_iter().fold(0.0, f64::max);
-    Ok(Metrics { rmse, max, p999, psnr: -20.0 * rmse.log10(), pixels: pixels as u64 })
+    let flip = if max.is_finite() {
+        flip::errors(a, b, background)?.into_iter().map(f64::from).sum::<f64>() / pixels as f64
+    } else {
+        f64::INFINITY
+    };
+    Ok(Metrics { rmse, max, p999, psnr: -20.0 * rmse.log10(), flip, pixels: pixels as u64 })
+}
+
+/// The nearest rank: the smallest value that at least 99.9 % of them do not exceed.
+fn percentile_999(values: &mut [f64]) -> f64 {
+    let rank = values.len() - values.len() / 1000;
+    *values.select_nth_unstable_by(rank - 1, f64::total_cmp).1
+}
+
+fn check_sizes(a: &Image, b: &Image) -> Result<()> {
+    let sizes = [(a.width, a.height, a.rgba.len()), (b.width, b.height, b.rgba.len())];
+    if sizes[0] == sizes[1] && !a.rgba.is_empty() {
+        return Ok(());
+    }
+    let message =
+        format!("images of {}x{} and {}x{} pixels cannot be compared", a.width, a.height, b.width, b.height);
+    let help = Some("render both at the same size, of at least one pixel".into());
+    Err(Error::Usage { message, help })
+}
+
+/// Linear RGB of a premultiplied pixel over an opaque background.
+fn over([r, g, b, a]: [f32; 4], background: [f32; 3]) -> [f32; 3] {
+    let under = background.map(|x| x * (1.0 - a.clamp(0.0, 1.0)));
+    [r + under[0], g + under[1], b + under[2]]
 }
 
 fn difference(a: f32, b: f32) -> f64 {
@@ -80,7 +112,10 @@ mod tests {
     fn equal_images_do_not_differ() {
         let image = noise(40, 30);
         let metrics = compare(&image, &image).unwrap();
-        assert_eq!(metrics, Metrics { rmse: 0.0, max: 0.0, p999: 0.0, psnr: f64::INFINITY, pixels: 1200 });
+        assert_eq!(
+            metrics,
+            Metrics { rmse: 0.0, max: 0.0, p999: 0.0, psnr: f64::INFINITY, flip: 0.0, pixels: 1200 }
+        );
     }
 
     #[test]
@@ -130,7 +165,7 @@ mod tests {
             image.rgba[5][2] = value;
             for (a, b) in [(&image, &good), (&good, &image), (&image, &image)] {
                 let metrics = compare(a, b).unwrap();
-                assert_eq!((metrics.rmse, metrics.max), (f64::INFINITY, f64::INFINITY));
+                assert_eq!([metrics.rmse, metrics.max, metrics.flip], [f64::INFINITY; 3]);
                 assert_eq!(metrics.psnr, f64::NEG_INFINITY);
             }
         }
