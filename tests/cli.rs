@@ -179,6 +179,11 @@ fn info_counts() {
     desk.write("fog.nrrd", NRRD.to_owned() + "12345678");
     let output = desk.run(&["volume", "info", "fog.nrrd"]);
     assert!(text(&output.stdout).contains("2 x 2 x 2"), "{}", text(&output.stderr));
+    let output = desk.run(&["volume", "info", "fog.toml", "--json"]);
+    let value: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!((&value["format"], &value["size"]), (&"recipe \"fog\"".into(), &serde_json::json!([8, 8, 4])));
+    assert_eq!(value["ranges"].as_array().unwrap().len(), 4);
+    desk.refuses(&["volume", "info", "scene.toml"], 3, &["scene.toml", "not a recipe"]);
 }
 
 /// The header of 2 x 2 x 2 bytes.

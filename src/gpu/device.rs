@@ -57,7 +57,7 @@ pub struct DeviceInfo {
     pub uuid: String,
     /// `discrete`, `integrated`, `virtual`, `cpu` or `other`.
     pub kind: String,
-    /// Name and version of the driver.
+    /// Name and version of the driver; the number of its version where it does not tell its name.
     pub driver: String,
     /// The Vulkan version that it offers.
     pub api_version: String,
@@ -212,6 +212,28 @@ impl Instance {
             .collect())
     }
 
+    /// The driver's name and version, where it has `VK_KHR_driver_properties`, as about all of Vulkan 1.2 and later do.
+    fn driver(&self, handle: vk::PhysicalDevice) -> Option<String> {
+        // SAFETY: plain query on a handle of this instance.
+        let extensions = unsafe { self.raw.enumerate_device_extension_properties(handle) }.ok()?;
+        let tells = |extension: &vk::ExtensionProperties| {
+            extension.extension_name_as_c_str() == Ok(ash::khr::driver_properties::NAME)
+        };
+        // SAFETY: as above.
+        let api_version = unsafe { self.raw.get_physical_device_properties(handle) }.api_version;
+        if api_version < vk::API_VERSION_1_1 || !extensions.iter().any(tells) {
+            return None;
+        }
+        let mut driver = vk::PhysicalDeviceDriverProperties::default();
+        let mut all = vk::PhysicalDeviceProperties2::default().push_next(&mut driver);
+        // SAFETY: the device offers Vulkan 1.1, which has this query, and the extension of the structure.
+        unsafe { self.raw.get_physical_device_properties2(handle, &mut all) };
+        let parts = [driver.driver_name_as_c_str(), driver.driver_info_as_c_str()];
+        let parts = parts.map(|part| part.unwrap_or_default().to_string_lossy());
+        let told: Vec<&str> = parts.iter().map(|part| part.trim()).filter(|part| !part.is_empty()).collect();
+        (!told.is_empty()).then(|| told.join(" "))
+    }
+
     fn describe(&self, index: usize, handle: vk::PhysicalDevice) -> DeviceInfo {
         // SAFETY: plain queries on a handle of this instance.
         let (properties, memory) = unsafe {
@@ -226,6 +248,7 @@ impl Instance {
             // SAFETY: the device offers Vulkan 1.1, which has this query and this structure.
             unsafe { self.raw.get_physical_device_properties2(handle, &mut all) };
         }
+        let driver = self.driver(handle);
         let hex = |bytes: &[u8]| bytes.iter().map(|byte| format!("{byte:02x}")).collect::<String>();
         let uuid = id.device_uuid;
         let version = |version| {
@@ -248,7 +271,7 @@ impl Instance {
                 _ => "other",
             }
             .to_owned(),
-            driver: version(properties.driver_version),
+            driver: driver.unwrap_or_else(|| version(properties.driver_version)),
             api_version: version(properties.api_version),
             memory_bytes: memory
                 .memory_heaps_as_slice()

@@ -7,7 +7,7 @@ use super::magma::MAGMA;
 use super::{check_sizes, over};
 use crate::Result;
 use crate::frame::Image;
-use crate::frame::file::linear_from_srgb;
+use crate::frame::srgb::linear_from_srgb;
 
 /// The luminance (Rec. 709, linear light) of `a` less that of `b`, for each pixel, both over `background` (linear
 /// RGB), where white has 1.
@@ -63,7 +63,7 @@ fn picture(values: &[f32], width: u32, color: impl Fn(f32) -> [f32; 3]) -> Image
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::frame::file::srgb_from_linear;
+    use crate::frame::srgb::srgb_from_linear;
 
     fn bytes(image: &Image) -> Vec<[u8; 3]> {
         let byte = |x: f32| (255.0 * srgb_from_linear(x)).round() as u8;
