@@ -40,6 +40,7 @@ pub mod progress;
 pub mod reference;
 pub mod scene;
 pub mod shell;
+pub mod stress;
 pub mod volume;
 
 pub use error::{Error, Result};
