@@ -30,8 +30,7 @@ void main() {
     float step = (segment.y - segment.x) / float(count);
     float depth_per_step = step * length(ray) * view.per_opacity_distance;
 
-    vec4 rgba = vec4(0.0);
-    float transmittance = 1.0;
+    Gathered gathered = Gathered(vec4(0.0), vec4(0.0));
     float mean_distance = 0.0;
     for (uint i = 0; i < count; i++) {
         float z = segment.x + (float(i) + 0.5) * step;
@@ -40,14 +39,13 @@ void main() {
         float alpha = opacity(depth);
         // Colour is premultiplied by the texture's alpha; what counts is this step's.
         vec3 colour = texel.a > 0.0 ? texel.rgb * (alpha / texel.a) : vec3(0.0);
-        rgba += transmittance * vec4(colour, alpha);
 #ifdef DEPTH
-        mean_distance += transmittance * alpha * z * length(ray);
+        mean_distance += transmittance(gathered) * alpha * z * length(ray);
 #endif
-        transmittance *= exp(-depth);
+        lay_behind(gathered, vec4(colour, alpha));
     }
-    out_rgba = rgba;
+    out_rgba = gathered.rgba;
 #ifdef DEPTH
-    out_depth = vec4(mean_distance, 0.0, 0.0, rgba.a);
+    out_depth = vec4(mean_distance, 0.0, 0.0, gathered.rgba.a);
 #endif
 }
