@@ -5,7 +5,7 @@ use std::sync::Arc;
 use glam::{DVec2, DVec3};
 
 use super::compare::{ROUNDING, Transmittance, transmittance};
-use super::scenes::{columns, constant_scene, in_turns, loose, painted, view};
+use super::scenes::{columns, connected, constant_scene, painted, view};
 use super::{Case, Stand, alpha};
 use crate::frame::{Image, file};
 use crate::mesh::generate::{Generator, Plane, Torus};
@@ -159,33 +159,35 @@ fn thin_path(stand: &Stand<'_>) -> Result<f64> {
     Ok(worst)
 }
 
-/// Four hundred plates one behind the other, each 2500 opacity distances of alpha 1e-8 thick.
+/// A column of four hundred prisms, 1200 tetrahedra, a million opacity distances of alpha 1e-8 long.
 ///
-/// The bound: every blend rounds the sum so far once, by at most 2^-24 of it, so 400 * 2^-24; each plate has a thickness that
-/// two ends at a distance of up to 8 make, rounded by some 8 * 8 * 2^-24 = 3.8e-6 of a thickness of 0.01: 3.8e-4 of it, but
-/// random between plates, so a twentieth of that is left of 400.
-const THIN_LAYERS: f64 = 400.0 * ROUNDING + 3.8e-4 / 20.0;
+/// The bound: every blend rounds the sum so far once, by at most 2^-24 of it; a ray passes at most all. Lengths add up to that of
+/// the column, since each tetrahedron ends where the next begins; they and the opacity are as in [`THIN_PATH`].
+const THIN_LAYERS: f64 = 1200.0 * ROUNDING + THIN_PATH;
 
 fn thin_layers(stand: &Stand<'_>) -> Result<f64> {
-    let plates: Vec<[DVec3; 4]> = (0..400)
-        .map(|i| {
-            let y = -0.012 * f64::from(i);
-            let corner = |turn: f64| {
-                let at = 20.0 * DVec2::from_angle(turn);
-                DVec3::new(at.x, y, at.y)
-            };
-            [corner(0.1), corner(2.2), corner(4.3), DVec3::new(0.0, y + 0.01, 0.0)]
+    let layers = 400;
+    let vertices = (0..=layers).flat_map(|layer| {
+        [0.1, 2.2, 4.3].map(|turn| {
+            let at = 20.0 * DVec2::from_angle(turn);
+            DVec3::new(at.x, -0.01 * f64::from(layer), at.y)
         })
-        .collect();
-    let shell = loose(&plates, &in_turns(plates.len()));
+    });
+    let tetrahedra = (0..layers).flat_map(|layer| {
+        let [a, b, c, d, e, f] = [0, 1, 2, 3, 4, 5].map(|i| 3 * layer + i);
+        [[a, b, c, f], [a, b, e, f], [a, d, e, f]]
+    });
+    let (vertices, tetrahedra): (Vec<_>, Vec<_>) = (vertices.collect(), tetrahedra.collect());
+    let shell = connected(vertices, tetrahedra, &[DVec3::splat(0.5); 1200]);
     relative_error(stand, painted(shell, &[([0.5; 3], 1e-8)], 4e-6, down(3.0)))
 }
 
 /// Optical depths from 1e-6 to 1e6 through one plate.
 ///
 /// The bound: the length of 0.5 lies between 2 and 2.5 from the eye, so its ends' roundings, four each, are 36 * 2^-24 of it.
-/// Opacity follows with the same relative error at most, and some 16 roundings of its own.
-const DEPTH_RANGE: f64 = 52.0 * ROUNDING;
+/// Opacity follows with the same relative error at most, and some 16 roundings of its own; beyond an optical depth of 1/32 it
+/// is 1 - exp(-depth), where exp may be off by two: 64 * 2^-24 of 1/32.
+const DEPTH_RANGE: f64 = (36.0 + 16.0 + 64.0) * ROUNDING;
 
 fn depth_range(stand: &Stand<'_>) -> Result<f64> {
     let mesh = Generator::Plane(Plane { size: 2.0, segments: 2 }).build()?;
