@@ -160,7 +160,8 @@ fn a_strip_with_a_gap_would_be_seen() {
     let mut corners: Vec<[DVec3; 4]> = (0..shell.cells.len()).map(|t| shell.vertices_of(t)).collect();
     let scene = seen(shell, DVec3::new(4.0, 1.0, 3.0), 48);
     // One tetrahedron a little smaller at one of its inner faces than its neighbour thinks.
-    corners[2][1] += 1e-3 * (corners[2][3] - corners[2][1]);
+    let [_, from, _, to] = corners[2];
+    corners[2][1] = from.lerp(to, 1e-3);
     let torn = seen(loose(&corners, &vec![DVec3::splat(0.5); corners.len()]), scene.view.camera.eye, 48);
     let reference = Reference::new(&torn, &torn.view);
     let off = (0..48 * 48).map(|pixel| {
