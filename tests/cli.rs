@@ -329,3 +329,15 @@ fn exit_codes_are_in_the_help() {
         assert!(help.lines().any(|line| line.trim_start().starts_with(code)), "{code}: {help}");
     }
 }
+
+#[test]
+fn stress_cases_are_chosen_by_name_and_told_as_json() {
+    let desk = Desk::new();
+    let output = desk.run(&["stress", "--quick", "--filter", "texels", "--filter", "thick", "--json"]);
+    assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+    let outcomes: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    let names: Vec<_> = outcomes.as_array().unwrap().iter().map(|outcome| &outcome["case"]).collect();
+    assert_eq!(names, ["thickness", "texels"]);
+    assert_eq!(outcomes[0]["passed"], true);
+    desk.refuses(&["stress", "--filter", "nothing"], 2, &["`nothing`", "zero-volume"]);
+}

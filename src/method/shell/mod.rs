@@ -140,7 +140,7 @@ impl Method for Shell {
             target: &canvas.target,
             buffers: &[&canvas.cells, &canvas.tiles, &canvas.members],
             textures: &[&self.volume],
-            push_constants: bytemuck::bytes_of(&constants(&self.scene, view)),
+            push_constants: bytemuck::bytes_of(&constants(&self.scene, view, seen.unit)),
             batches: &batches,
         })?;
         watch.lap("march");
@@ -152,7 +152,7 @@ impl Method for Shell {
         let rgba = canvas.target.read(0);
         let depth = view.depth.then(|| {
             let mean = |[weighted, _, _, alpha]: [f32; 4]| {
-                if alpha > 0.0 { weighted / alpha } else { f32::INFINITY }
+                if alpha > 0.0 { (seen.unit * f64::from(weighted / alpha)) as f32 } else { f32::INFINITY }
             };
             canvas.target.read(1).into_iter().map(mean).collect()
         });
@@ -259,7 +259,8 @@ fn plan(march: March) -> u32 {
     }
 }
 
-fn constants(scene: &Scene, view: &View) -> ViewConstants {
+/// `unit`: see [`Seen::unit`].
+fn constants(scene: &Scene, view: &View, unit: f64) -> ViewConstants {
     let pixel = view.pixel_at_unit_depth();
     let (step, samples) = match scene.march {
         March::Paper { samples } => (1.0, samples),
@@ -270,11 +271,11 @@ fn constants(scene: &Scene, view: &View) -> ViewConstants {
     ViewConstants {
         centre: [0.5 * view.width as f32, 0.5 * view.height as f32],
         pixel: pixel as f32,
-        near: view.camera.near as f32,
+        near: (view.camera.near / unit) as f32,
         texels: scene.volume.levels[0].size.map(|side| side as f32),
         last_level: (scene.volume.levels.len() - 1) as f32,
         lod_scale: (scene.medium.lod_footprint * pixel) as f32,
-        per_opacity_distance: scene.medium.opacity_distance.recip() as f32,
+        per_opacity_distance: (unit / scene.medium.opacity_distance) as f32,
         step: step as f32,
         samples,
     }
