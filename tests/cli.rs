@@ -258,6 +258,16 @@ fn files_that_a_scene_names_are_told() {
 }
 
 #[test]
+fn a_volume_that_the_device_cannot_hold_is_told_before_it_is_computed() {
+    let desk = Desk::new();
+    // No device takes a side of 2^24 texels; the mesh, which would be loaded first, is not even there.
+    desk.write("fog.toml", "recipe = \"fog\"\nsize = [16777216, 1, 1]\n");
+    let generator = "generator = \"sphere\"\nsegments = 8\nrings = 4\n";
+    desk.write("large.toml", SCENE.replace(generator, "file = \"nowhere.obj\"\n"));
+    desk.refuses(&["render", "large.toml", "--quiet"], 4, &["16777216 x 1 x 1 texels"]);
+}
+
+#[test]
 fn an_unknown_device_is_told() {
     let desk = Desk::new();
     desk.refuses(&["render", "scene.toml", "--quiet", "--device", "no such device"], 4, &["no such device"]);

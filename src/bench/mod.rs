@@ -55,7 +55,7 @@ pub fn steps(
 /// The last of the frames, and the median of their times; with more than one run, the first of all is warm-up.
 fn render(scene: &Arc<Scene>, name: &str, setup: &Setup<'_>, runs: usize) -> Result<(Frame, f64)> {
     let entry = method::by_name(name).expect("a name of the table");
-    let mut method = (entry.prepare)(scene.clone(), setup)?;
+    let mut method = entry.prepare(scene.clone(), setup)?;
     let mut frame = method.render(&scene.view)?;
     let mut times = Vec::new();
     for _ in 0..runs {

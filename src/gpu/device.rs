@@ -9,6 +9,8 @@ use ash::vk;
 use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
 use serde::Serialize;
 
+use super::target::Target;
+use super::texture::{Texture3d, most_levels};
 use crate::{Error, Result};
 
 const VALIDATION_LAYER: &CStr = c"VK_LAYER_KHRONOS_validation";
@@ -418,6 +420,17 @@ impl Gpu {
     /// The rasteriser's subpixels a pixel: it snaps vertices to this grid.
     pub fn subpixels(&self) -> u32 {
         1 << self.limits.sub_pixel_precision_bits
+    }
+
+    /// Refuses a picture or a volume that the device could not hold, of so many pixels or texels a side. What is asked here is
+    /// asked again when they are made; this is for asking before the volume is computed.
+    ///
+    /// # Errors
+    /// [`Error::Device`] where a side is too long, [`Error::OutOfMemory`].
+    pub fn check_sizes(&self, picture: [u32; 2], volume: [u32; 3]) -> Result<()> {
+        Target::check(self, picture[0], picture[1], 1)?;
+        Texture3d::check(self, "the volume", volume, most_levels(volume))?;
+        Ok(())
     }
 
     /// Whether images of `format` with optimal tiling can do all of `features`.

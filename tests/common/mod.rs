@@ -28,7 +28,7 @@ impl Watched {
         };
         let entry = method::by_name(name).expect("a known method");
         let method =
-            (entry.prepare)(scene.clone(), &setup).unwrap_or_else(|error| panic!("{error}\n{error:?}"));
+            entry.prepare(scene.clone(), &setup).unwrap_or_else(|error| panic!("{error}\n{error:?}"));
         Self { method: Some(method), messages }
     }
 

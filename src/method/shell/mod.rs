@@ -20,7 +20,7 @@ use crate::frame::{Frame, Image, Report, Stopwatch};
 use crate::gpu::{Batch, Buffer, Draw, Gpu, Pipeline, PipelineInfo, Target, Texture3d, draw, shaders};
 use crate::order::{Sorted, Sorter};
 use crate::progress::{Interrupt, Progress};
-use crate::scene::{March, Scene, View};
+use crate::scene::{March, Scene, Sizes, View};
 use crate::volume::Quantity;
 
 /// The push constants of `glsl/include/shell.glsl`: see there for each member.
@@ -83,26 +83,35 @@ struct CanvasKind {
     cycles: bool,
 }
 
-/// Opens the device and uploads the scene.
+/// A device without a scene.
+struct Opened {
+    gpu: Arc<Gpu>,
+    progress: Arc<dyn Progress>,
+    interrupt: Interrupt,
+}
+
+/// Opens the device.
 ///
 /// # Errors
-/// [`Error::Device`](crate::Error::Device) and [`Error::OutOfMemory`](crate::Error::OutOfMemory): checked before anything
-/// is drawn.
-pub fn prepare(scene: Arc<Scene>, setup: &Setup<'_>) -> Result<Box<dyn Method>> {
+/// [`Error::Device`](crate::Error::Device) where there is none.
+pub fn open(setup: &Setup<'_>) -> Result<Box<dyn super::Opened>> {
     setup.progress.stage("opening the device");
     let gpu = Gpu::open(setup.device, setup.validation)?;
-    setup.progress.stage("uploading the volume");
-    let volume = Texture3d::upload(&gpu, "the volume", &scene.volume)?;
-    let sorter = Sorter::new(&scene.shell.topology);
-    Ok(Box::new(Shell {
-        scene,
-        gpu,
-        progress: setup.progress.clone(),
-        interrupt: setup.interrupt.clone(),
-        sorter,
-        volume,
-        canvas: None,
-    }))
+    Ok(Box::new(Opened { gpu, progress: setup.progress.clone(), interrupt: setup.interrupt.clone() }))
+}
+
+impl super::Opened for Opened {
+    fn admit(&self, sizes: &Sizes) -> Result<()> {
+        self.gpu.check_sizes(sizes.picture, sizes.volume)
+    }
+
+    fn prepare(self: Box<Self>, scene: Arc<Scene>) -> Result<Box<dyn Method>> {
+        let Self { gpu, progress, interrupt } = *self;
+        progress.stage("uploading the volume");
+        let volume = Texture3d::upload(&gpu, "the volume", &scene.volume)?;
+        let sorter = Sorter::new(&scene.shell.topology);
+        Ok(Box::new(Shell { scene, gpu, progress, interrupt, sorter, volume, canvas: None }))
+    }
 }
 
 impl Method for Shell {
