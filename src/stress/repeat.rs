@@ -19,9 +19,9 @@ pub(super) const CASES: &[Case] = &[
 ];
 
 /// Overlaps, so that sorting, cycles and blending all have their part.
-fn scene(stand: &Stand<'_>) -> Result<Arc<Scene>> {
+fn scene() -> Result<Arc<Scene>> {
     let mesh = Generator::Torus(Torus { segments: 32, rings: 16, ..Torus::default() }).build()?;
-    let view = view(DVec3::new(0.4, 1.4, 3.0), DVec3::ZERO, 40.0, 1e-3, stand.either(96, 256));
+    let view = view(DVec3::new(0.4, 1.4, 3.0), DVec3::ZERO, 40.0, 1e-3, 96);
     let options = ShellOptions { uv_scale: glam::DVec2::new(4.0, 3.0), ..ShellOptions::new(0.9) };
     Ok(Arc::new(painted(Shell::build(&mesh, &options)?, &PAINTS, 0.3, view)))
 }
@@ -32,7 +32,7 @@ fn differing(a: &Image, b: &Image) -> usize {
 }
 
 fn runs(stand: &Stand<'_>) -> Result<f64> {
-    let scene = scene(stand)?;
+    let scene = scene()?;
     let first = stand.frame(&scene)?.image;
     // Every other run with a device of its own.
     let mut method = stand.prepare(&scene)?;
@@ -53,7 +53,7 @@ fn threads(stand: &Stand<'_>) -> Result<f64> {
     for count in [1, 2, 4] {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(count).build();
         let pool = pool.map_err(|error| Error::OutOfMemory { message: error.to_string(), help: None })?;
-        let image = pool.install(|| stand.frame(&scene(stand)?))?.image;
+        let image = pool.install(|| stand.frame(&scene()?))?.image;
         differ += differing(&image, first.get_or_insert_with(|| image.clone()));
     }
     Ok(differ as f64)
