@@ -98,7 +98,7 @@ impl Stand<'_> {
     /// The `shell` method with this scene.
     fn prepare(&self, scene: &Arc<Scene>) -> Result<Box<dyn Method>> {
         self.setup.interrupt.check()?;
-        method::shell::prepare(scene.clone(), &self.setup)
+        method::shell::open(&self.setup)?.prepare(scene.clone())
     }
 
     /// What the `shell` method makes of the scene's own view.
