@@ -46,6 +46,7 @@ pub(super) const CASES: &[Case] = &[
     // f64 rounds a scaled scene otherwise, by 1e-16; relative to the scene's own size all that reaches f32 is the same but for
     // one number in 2^29 / 16, which is off by a rounding of 2^-24, and 100 times that where a ray grazes: 6e-6.
     Case { name: "scale", measure: "largest difference", bound: 1e-5, worst: scale },
+    Case { name: "scale-depth", measure: "relative error of depth", bound: SCALE_DEPTH, worst: scale_depth },
     // As for `scale`: the sign of one coordinate changes, and with it the order of some sums in f64.
     Case { name: "mirror", measure: "largest difference", bound: 1e-5, worst: mirror },
     // The same tetrahedra in another order of storage; along a ray they have but one order.
@@ -151,6 +152,32 @@ fn scale(stand: &Stand<'_>) -> Result<f64> {
             view.camera.near *= scale;
             let there = stand.frame(&in_waves(&mesh, scale, view)?)?.image;
             worst = worst.max(metric::compare(&here, &there)?.max);
+        }
+    }
+    Ok(worst)
+}
+
+/// The bound: in a constant medium a tetrahedron has one sample, in its middle; over a length `l` of optical depth `d` light is
+/// stopped `l d / 12` before it on average. With an alpha of 1e-3 over 0.2, edges of at most 0.6, and an eye 1.8 away:
+/// 0.6 * 3e-3 / 12 / 1.8 = 8.3e-5; some 32 roundings besides.
+const SCALE_DEPTH: f64 = 8.3e-5 + 32.0 * ROUNDING;
+
+/// [`Frame::depth`](crate::frame::Frame::depth) against the reference's, where more than a rounding of light is stopped.
+fn scale_depth(stand: &Stand<'_>) -> Result<f64> {
+    let mut worst = 0.0f64;
+    for scale in [1e-6, 1.0, 1e6] {
+        let [view, _] = views(stand);
+        let (mesh, mut view) = placed(&torus()?, view, |position| scale * position);
+        view.camera.near *= scale;
+        view.depth = true;
+        let scene = Arc::new(constant_scene(&mesh, scale * THICKNESS, 1e-3, 1.0, view)?);
+        let there = stand.frame(&scene)?;
+        let exact = reference::render(&scene, &view, stand.setup.progress.as_ref(), stand.setup.interrupt)?;
+        let seen = exact.image.rgba.iter().zip(&there.image.rgba).map(|(a, b)| a[3].min(b[3]) > 1e-5);
+        let [depths, exact] = [there.depth, exact.depth].map(Option::unwrap_or_default);
+        for ((depth, exact), _) in depths.iter().zip(&exact).zip(seen).filter(|(_, seen)| *seen) {
+            let error = (f64::from(*depth) / f64::from(*exact) - 1.0).abs();
+            worst = if error.is_nan() { f64::INFINITY } else { worst.max(error) };
         }
     }
     Ok(worst)

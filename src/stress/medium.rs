@@ -25,7 +25,7 @@ pub(super) const CASES: &[Case] = &[
     // One ray in ten thousand may graze the outside at 1/100 radian, where 8 roundings move its entry by a hundred times as
     // much as straight ahead: 100 * 16 * 2^-24.
     Case {
-        name: "constant-medium-99.99-%",
+        name: "constant-medium-p9999",
         measure: "error of transmittance",
         bound: 1e-4,
         worst: |stand| Ok(percentile(&torus(stand)?, 0.9999)),
