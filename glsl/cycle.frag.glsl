@@ -55,8 +55,7 @@ uint gather(vec3 ray, float done, out float horizon) {
 void main() {
     vec3 ray = pixel_ray();
     float per_depth = length(ray) * view.per_opacity_distance;
-    vec4 rgba = vec4(0.0);
-    float transmittance = 1.0;
+    Gathered gathered = Gathered(vec4(0.0), vec4(0.0));
     float mean_distance = 0.0;
     float z = 0.0;
     float before;
@@ -102,18 +101,17 @@ void main() {
                 }
                 float alpha = walls > 0 ? 1.0 : opacity(depth);
                 vec3 colour = walls > 0 ? wall / float(walls) : depth > LEAST ? emission * (alpha / depth) : vec3(0.0);
-                rgba += transmittance * vec4(colour, alpha);
 #ifdef DEPTH
-                mean_distance += transmittance * alpha * at * length(ray);
+                mean_distance += transmittance(gathered) * alpha * at * length(ray);
 #endif
-                transmittance *= walls > 0 ? 0.0 : exp(-depth);
+                lay_behind(gathered, vec4(colour, alpha));
             }
             z = next;
         }
         // Where more than MOST_HITS members overlap in one point there is no getting on; the rest of the ray is left out.
     } while (horizon < 3.0e38 && z > before);
-    out_rgba = rgba;
+    out_rgba = gathered.rgba;
 #ifdef DEPTH
-    out_depth = vec4(mean_distance, 0.0, 0.0, rgba.a);
+    out_depth = vec4(mean_distance, 0.0, 0.0, gathered.rgba.a);
 #endif
 }

@@ -26,10 +26,10 @@ void main() {
     vec2 segment = interval(planes, ray);
     if (!(segment.y > segment.x)) discard;
 
-    Light light = Light(vec4(0.0), 1.0, 0.0);
+    Light light = Light(Gathered(vec4(0.0), vec4(0.0)), 0.0);
     march(path_in(texture_rows, ray), segment, length(ray) * view.per_opacity_distance, light);
-    out_rgba = light.rgba;
+    out_rgba = light.gathered.rgba;
 #ifdef DEPTH
-    out_depth = vec4(light.depth * length(ray), 0.0, 0.0, light.rgba.a);
+    out_depth = vec4(light.depth * length(ray), 0.0, 0.0, light.gathered.rgba.a);
 #endif
 }

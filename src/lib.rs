@@ -22,7 +22,7 @@
 //!
 //! # The dependency rule
 //!
-//! Modules depend on one another in one direction only: the command line on [`bench`](mod@bench) and [`method`], these on
+//! Modules depend on one another in one direction only: the command line on [`bench`](mod@bench), [`stress`] and [`method`], these on
 //! [`gpu`], and all of them on the modules that know no device. What a shader computes is also computed without one:
 //! [`reference`](mod@reference) evaluates the same integral in f64 on the CPU, and [`metric`] tells how far the two are
 //! apart. `ash` and `unsafe` are in [`gpu`] alone.
@@ -41,6 +41,7 @@ pub mod progress;
 pub mod reference;
 pub mod scene;
 pub mod shell;
+pub mod stress;
 pub mod value;
 pub mod volume;
 

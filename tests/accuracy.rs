@@ -136,8 +136,13 @@ fn densities_are_interpolated_as_extinction() {
     let shell = Shell::build(&torus, &options).unwrap();
     let mut scene = Scene::new(shell, Pyramid::build(volume), 0.05);
     for (distance, step) in [(1.0, 0.25), (6.0, 0.25)] {
-        scene.view =
-            common::view(distance * DVec3::new(1.0, 1.3, 1.9), DVec3::ZERO, 40.0 / distance, 0.01, 160);
+        scene.view = mesoshell::stress::scenes::view(
+            distance * DVec3::new(1.0, 1.3, 1.9),
+            DVec3::ZERO,
+            40.0 / distance,
+            0.01,
+            160,
+        );
         let error = |march| {
             let scene = Arc::new(Scene { march, ..scene.clone() });
             let [shell, reference] =

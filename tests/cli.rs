@@ -179,6 +179,11 @@ fn info_counts() {
     desk.write("fog.nrrd", NRRD.to_owned() + "12345678");
     let output = desk.run(&["volume", "info", "fog.nrrd"]);
     assert!(text(&output.stdout).contains("2 x 2 x 2"), "{}", text(&output.stderr));
+    let output = desk.run(&["volume", "info", "fog.toml", "--json"]);
+    let value: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!((&value["format"], &value["size"]), (&"recipe \"fog\"".into(), &serde_json::json!([8, 8, 4])));
+    assert_eq!(value["ranges"].as_array().unwrap().len(), 4);
+    desk.refuses(&["volume", "info", "scene.toml"], 3, &["scene.toml", "not a recipe"]);
 }
 
 /// The header of 2 x 2 x 2 bytes.
@@ -253,6 +258,16 @@ fn files_that_a_scene_names_are_told() {
 }
 
 #[test]
+fn a_volume_that_the_device_cannot_hold_is_told_before_it_is_computed() {
+    let desk = Desk::new();
+    // No device takes a side of 2^24 texels; the mesh, which would be loaded first, is not even there.
+    desk.write("fog.toml", "recipe = \"fog\"\nsize = [16777216, 1, 1]\n");
+    let generator = "generator = \"sphere\"\nsegments = 8\nrings = 4\n";
+    desk.write("large.toml", SCENE.replace(generator, "file = \"nowhere.obj\"\n"));
+    desk.refuses(&["render", "large.toml", "--quiet"], 4, &["16777216 x 1 x 1 texels"]);
+}
+
+#[test]
 fn an_unknown_device_is_told() {
     let desk = Desk::new();
     desk.refuses(&["render", "scene.toml", "--quiet", "--device", "no such device"], 4, &["no such device"]);
@@ -323,4 +338,16 @@ fn exit_codes_are_in_the_help() {
     for code in ["0 ", "1 ", "2 ", "3 ", "4 ", "5 ", "6 ", "130 "] {
         assert!(help.lines().any(|line| line.trim_start().starts_with(code)), "{code}: {help}");
     }
+}
+
+#[test]
+fn stress_cases_are_chosen_by_name_and_told_as_json() {
+    let desk = Desk::new();
+    let output = desk.run(&["stress", "--quick", "--filter", "texels", "--filter", "thick", "--json"]);
+    assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+    let outcomes: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    let names: Vec<_> = outcomes.as_array().unwrap().iter().map(|outcome| &outcome["case"]).collect();
+    assert_eq!(names, ["thickness", "texels"]);
+    assert_eq!(outcomes[0]["passed"], true);
+    desk.refuses(&["stress", "--filter", "nothing"], 2, &["`nothing`", "zero-volume"]);
 }

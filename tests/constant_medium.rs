@@ -9,49 +9,17 @@ mod common;
 
 use std::sync::Arc;
 
-use common::{Watched, constant_scene, view};
+use common::Watched;
 use glam::{DVec2, DVec3};
 use mesoshell::mesh::generate::{Generator, Torus};
 use mesoshell::reference::Reference;
-use mesoshell::scene::{Scene, View};
+use mesoshell::stress::compare::{AROUND, Transmittance, centre, extinction, transmittance};
+use mesoshell::stress::scenes::{constant_scene, view};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use rayon::prelude::*;
 
 const ALPHA: f32 = 0.5;
-
-/// What one picture showed.
-#[derive(Debug, Default)]
-struct Errors {
-    /// Of transmittance, all pixels.
-    errors: Vec<f64>,
-    /// Pixels whose ray passes more than a rounding of medium, but which stayed clear, or the other way round.
-    missed: usize,
-}
-
-fn compare(scene: &Scene, view: &View, alpha: &[f64]) -> Errors {
-    let reference = Reference::new(scene, view);
-    let per_length = -f64::from(1.0 - ALPHA).ln() / scene.medium.opacity_distance;
-    let exact: Vec<f64> = (0..alpha.len())
-        .into_par_iter()
-        .map(|i| {
-            let (x, y) = (i % view.width as usize, i / view.width as usize);
-            let length = reference.path_length(DVec2::new(x as f64 + 0.5, y as f64 + 0.5));
-            (-per_length * length).exp()
-        })
-        .collect();
-    let errors = exact.iter().zip(alpha).map(|(exact, alpha)| (exact - (1.0 - alpha)).abs()).collect();
-    // A pixel is missed, or covered for nothing, when its error is that of its whole opacity, and that opacity is more than
-    // snapping explains (the bound on the maximum).
-    let missed = exact
-        .iter()
-        .zip(alpha)
-        .filter(|(exact, alpha)| {
-            (**alpha == 0.0 && **exact < 1.0 - 2e-3) || (**alpha > 2e-3 && **exact == 1.0)
-        })
-        .count();
-    Errors { errors, missed }
-}
 
 #[test]
 fn transmittance_is_that_of_the_exact_path_length() {
@@ -69,9 +37,9 @@ fn transmittance_is_that_of_the_exact_path_length() {
         }
     };
     let any = view(DVec3::new(0.0, 0.0, 4.0), DVec3::ZERO, 40.0, 1e-3, 512);
-    let scene = Arc::new(constant_scene(&torus, thickness, ALPHA, 1.0, any));
+    let scene = Arc::new(constant_scene(&torus, thickness, ALPHA, 1.0, any).unwrap());
     let mut method = Watched::prepare("shell", &scene);
-    let mut all = Errors::default();
+    let mut all = Transmittance::default();
     for index in 0..20 {
         let direction = unit();
         let view = if index % 3 == 2 {
@@ -85,7 +53,7 @@ fn transmittance_is_that_of_the_exact_path_length() {
         };
         let frame = method.render(&view);
         let alpha: Vec<f64> = frame.image.rgba.iter().map(|pixel| f64::from(pixel[3])).collect();
-        let mut one = compare(&scene, &view, &alpha);
+        let mut one = transmittance(&scene, &view, &alpha);
         let worst = one.errors.iter().copied().fold(0.0, f64::max);
         println!("view {index}: max {worst:.2e}, missed {}", one.missed);
         all.missed += one.missed;
@@ -97,10 +65,10 @@ fn transmittance_is_that_of_the_exact_path_length() {
             let (hit, _) = alpha.iter().enumerate().min_by(|a, b| half(*a.1).total_cmp(&half(*b.1))).unwrap();
             let mut hole = alpha.clone();
             hole[hit] = 0.0;
-            assert_eq!(compare(&scene, &view, &hole).missed, one.missed + 1);
+            assert_eq!(transmittance(&scene, &view, &hole).missed, one.missed + 1);
             let mut twice = alpha;
             twice[hit] = 1.0 - (1.0 - twice[hit]).powi(2);
-            let worst = compare(&scene, &view, &twice).errors.into_iter().fold(0.0, f64::max);
+            let worst = transmittance(&scene, &view, &twice).errors.into_iter().fold(0.0, f64::max);
             assert!(worst > 2e-3, "counted twice, yet off by no more than {worst:e}");
         }
     }
@@ -129,9 +97,9 @@ fn what_is_left_is_rounding_not_snapping() {
         view(DVec3::new(0.3, 1.1, 3.2), DVec3::ZERO, 40.0, 1e-3, 512),
         view(DVec3::new(1.3, 0.3, 0.35), DVec3::new(0.5, 0.2, -1.0), 80.0, 1e-3, 512),
     ];
-    let scene = Arc::new(constant_scene(&torus, 0.15, ALPHA, 1.0, views[0]));
+    let scene = Arc::new(constant_scene(&torus, 0.15, ALPHA, 1.0, views[0]).unwrap());
     let mut method = Watched::prepare("shell", &scene);
-    let per_length = -f64::from(1.0 - ALPHA).ln() / scene.medium.opacity_distance;
+    let per_length = extinction(&scene);
     for view in views {
         let frame = method.render(&view);
         let reference = Reference::new(&scene, &view);
@@ -141,23 +109,13 @@ fn what_is_left_is_rounding_not_snapping() {
             (0..pixels)
                 .into_par_iter()
                 .filter(|&i| {
-                    let centre = DVec2::new((i % 512) as f64 + 0.5, (i / 512) as f64 + 0.5);
+                    let centre = centre(&view, i);
                     let exact = clear(centre);
                     let error = (exact - (1.0 - alpha_of(i))).abs();
                     if error <= 2e-6 {
                         return false;
                     }
-                    let directions = [
-                        DVec2::X,
-                        DVec2::NEG_X,
-                        DVec2::Y,
-                        DVec2::NEG_Y,
-                        DVec2::ONE,
-                        -DVec2::ONE,
-                        DVec2::new(1.0, -1.0),
-                        DVec2::new(-1.0, 1.0),
-                    ];
-                    let change = directions
+                    let change = AROUND
                         .map(|direction| (clear(centre + SHIFT_PIXELS * direction) - exact).abs())
                         .into_iter()
                         .fold(0.0, f64::max);

@@ -8,26 +8,19 @@ mod common;
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
-use common::{Watched, interlocking_bar, loose, view};
+use common::Watched;
 use glam::DVec3;
 use mesoshell::mesh::Mesh;
 use mesoshell::mesh::generate::{Generator, Sphere};
 use mesoshell::metric;
-use mesoshell::scene::{March, Medium, Scene, View};
+use mesoshell::scene::{Scene, View};
 use mesoshell::shell::{Cell, Shell, ShellOptions};
-use mesoshell::volume::{Pyramid, Quantity, Volume};
+use mesoshell::stress::scenes::{PAINTS, Paint, in_turns, loose, painted, ring, view};
 
 const BOUND: f64 = 1e-4;
 
-/// Columns of the texture, each of one straight colour and alpha.
-fn columns(colours: &[([f32; 3], f32)]) -> Pyramid {
-    let texels = colours.iter().map(|([r, g, b], a)| [r * a, g * a, b * a, *a]).collect();
-    Pyramid::build(Volume { size: [colours.len() as u32, 1, 1], texels, quantity: Quantity::Opacity })
-}
-
-fn scene(shell: Shell, volume: Pyramid, view: View) -> Arc<Scene> {
-    let medium = Medium { opacity_distance: 0.1, lod_footprint: 0.0 };
-    Arc::new(Scene { shell, volume, medium, view, march: March::Default { step: 0.5 } })
+fn scene(shell: Shell, paints: &[Paint], view: View) -> Arc<Scene> {
+    Arc::new(painted(shell, paints, 0.1, view))
 }
 
 /// Both methods' pictures agree; returns the cycles that the report counts.
@@ -42,23 +35,11 @@ fn agree(scene: &Arc<Scene>) -> u64 {
     shell.report.counts["cycles"]
 }
 
-/// A ring of bars, each over the next, between two more.
-fn ring(count: usize) -> Shell {
-    let mut bars = vec![interlocking_bar(0.0, 2.0)];
-    bars.extend((0..count).map(|i| interlocking_bar(i as f64 * TAU / count as f64, 0.0)));
-    bars.push(interlocking_bar(0.1, -2.0));
-    let texture: Vec<DVec3> =
-        (0..bars.len()).map(|i| DVec3::new((i as f64 % 3.0 + 0.5) / 3.0, 0.5, 0.5)).collect();
-    loose(&bars, &texture)
-}
-
-const PAINTS: [([f32; 3], f32); 3] = [([0.9, 0.1, 0.1], 0.9), ([0.1, 0.9, 0.1], 0.6), ([0.1, 0.1, 0.9], 0.8)];
-
 #[test]
 fn rings_of_interlocking_bars_are_resolved() {
     for count in [3, 6, 12] {
         let view = view(DVec3::new(0.0, 0.0, 8.0), DVec3::ZERO, 24.0, 0.01, 160);
-        let cycles = agree(&scene(ring(count), columns(&PAINTS), view));
+        let cycles = agree(&scene(ring(count), &PAINTS, view));
         assert!(cycles >= 1, "a ring of {count} is no cycle");
     }
 }
@@ -68,9 +49,9 @@ fn a_wrong_order_would_be_seen() {
     // The same ring without what makes it a cycle: all bars of one colour differ from the true picture by far more than
     // the bound, so a bar in the wrong place does too.
     let view = view(DVec3::new(0.0, 0.0, 8.0), DVec3::ZERO, 24.0, 0.01, 160);
-    let right = scene(ring(3), columns(&PAINTS), view);
+    let right = scene(ring(3), &PAINTS, view);
     let [a, b, c] = PAINTS;
-    let swapped = scene(ring(3), columns(&[b, a, c]), view);
+    let swapped = scene(ring(3), &[b, a, c], view);
     let pictures = [right, swapped].map(|scene| Watched::prepare("shell", &scene).render(&view).image);
     assert!(metric::compare(&pictures[0], &pictures[1]).unwrap().max > 0.1);
 }
@@ -79,7 +60,7 @@ fn a_wrong_order_would_be_seen() {
 fn a_cycle_before_the_near_plane_is_left_out() {
     let mut view = view(DVec3::new(0.0, 0.0, 8.0), DVec3::ZERO, 24.0, 0.01, 160);
     view.camera.near = 20.0;
-    let frame = Watched::prepare("shell", &scene(ring(3), columns(&PAINTS), view)).render(&view);
+    let frame = Watched::prepare("shell", &scene(ring(3), &PAINTS, view)).render(&view);
     assert_eq!(frame.report.counts["tetrahedra_in_cycles"], 3);
     assert_eq!(frame.report.counts["tetrahedra_drawn"], 0);
     assert!(frame.image.rgba.iter().all(|pixel| *pixel == [0.0; 4]));
@@ -91,7 +72,7 @@ fn a_tetrahedron_too_small_for_its_maps_is_left_out() {
     let mut shell = ring(3);
     let view = view(DVec3::new(0.0, 0.0, 8.0), DVec3::ZERO, 24.0, 0.01, 160);
     let drawn = |shell: Shell| {
-        let frame = Watched::prepare("shell", &scene(shell, columns(&PAINTS), view)).render(&view);
+        let frame = Watched::prepare("shell", &scene(shell, &PAINTS, view)).render(&view);
         frame.report.counts["tetrahedra_drawn"]
     };
     assert_eq!(drawn(shell.clone()), 5);
@@ -105,7 +86,7 @@ fn views_one_after_another_are_drawn_as_each_alone() {
     let corner = view(DVec3::new(0.0, 0.0, 8.0), DVec3::new(0.9, 0.9, 0.0), 2.0, 0.01, 96);
     let mut behind = whole;
     behind.camera.near = 8.5;
-    let scene = scene(ring(12), columns(&PAINTS), whole);
+    let scene = scene(ring(12), &PAINTS, whole);
     let mut method = Watched::prepare("shell", &scene);
     let mut drawn = Vec::new();
     for view in [corner, whole, behind, whole] {
@@ -133,10 +114,10 @@ fn overlapping() -> Mesh {
 #[test]
 fn media_that_overlap_add() {
     let shell = Shell::build(&overlapping(), &ShellOptions::new(0.2)).unwrap();
-    let volume = columns(&[([0.9, 0.5, 0.1], 0.3), ([0.1, 0.5, 0.9], 0.4)]);
+    let paints = [([0.9, 0.5, 0.1], 0.3), ([0.1, 0.5, 0.9], 0.4)];
     for eye in [DVec3::new(1.0, 1.5, 4.0), DVec3::new(4.0, 0.5, -1.0), DVec3::new(0.5, 0.1, 0.0)] {
         let view = view(eye, DVec3::new(0.5, 0.1, 0.05) + 0.01 * DVec3::Z, 50.0, 0.01, 160);
-        let scene = scene(shell.clone(), volume.clone(), view);
+        let scene = scene(shell.clone(), &paints, view);
         assert!(agree(&scene) >= 1);
     }
 }
@@ -152,9 +133,8 @@ fn more_members_in_a_pixel_than_are_kept_at_once_are_resolved_in_turns() {
             [corner(0.0), corner(1.0), corner(2.0), DVec3::new(0.0, 0.0, z + 0.03)]
         })
         .collect();
-    let texture: Vec<DVec3> =
-        (0..200).map(|i| DVec3::new((f64::from(i % 3) + 0.5) / 3.0, 0.5, 0.5)).collect();
+    let texture = in_turns(200);
     let faint = PAINTS.map(|(colour, alpha)| (colour, 0.2 * alpha));
     let view = view(DVec3::new(0.1, 0.2, 6.0), DVec3::ZERO, 24.0, 0.01, 96);
-    assert!(agree(&scene(loose(&pile, &texture), columns(&faint), view)) >= 1);
+    assert!(agree(&scene(loose(&pile, &texture), &faint, view)) >= 1);
 }

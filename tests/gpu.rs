@@ -41,6 +41,15 @@ fn a_device_is_chosen_by_index_name_and_uuid() {
     }
 }
 
+/// Every driver of Vulkan 1.2 tells its name; `watched` that asking for it is allowed.
+#[test]
+fn the_driver_is_told_by_name() {
+    watched(|gpu| {
+        let driver = &gpu.info().driver;
+        assert!(driver.contains(char::is_alphabetic) && driver.contains(char::is_numeric), "{driver}");
+    });
+}
+
 #[test]
 fn a_volume_over_the_limit_is_refused() {
     watched(|gpu| {

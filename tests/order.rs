@@ -1,10 +1,7 @@
 //! Visibility orders, checked along every pixel's ray of many views.
 
-mod common;
-
 use std::f64::consts::TAU;
 
-use common::{interlocking_bar, loose};
 use glam::DVec3;
 use mesoshell::mesh::Mesh;
 use mesoshell::mesh::generate::{Generator, Plane, Sphere, Torus, Tube, Vase};
@@ -13,6 +10,7 @@ use mesoshell::order::search::InFront;
 use mesoshell::order::{self, Check, Order, Sorter};
 use mesoshell::scene::{Camera, View};
 use mesoshell::shell::{Shell, ShellOptions};
+use mesoshell::stress::scenes::{interlocking_bar, loose};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 

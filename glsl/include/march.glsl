@@ -6,8 +6,7 @@ const uint PLAN_EXACT = 2;   // Gauss in each voxel
 
 // What a ray has gathered, front to back.
 struct Light {
-    vec4 rgba;           // premultiplied
-    float transmittance;
+    Gathered gathered;
     float depth;         // integral of T sigma z dz, in depth along the ray
 };
 
@@ -27,9 +26,8 @@ void march_midpoints(Path path, vec2 segment, float per_depth, uint count, inout
         vec4 texel = fetch(path, z);
         float optical = extinction(texel) * max(step * per_depth, LEAST);
         float alpha = opacity(optical);
-        light.rgba += light.transmittance * vec4(emitted(texel, alpha), alpha);
-        light.depth += light.transmittance * alpha * z;
-        light.transmittance *= exp(-optical);
+        light.depth += transmittance(light.gathered) * alpha * z;
+        lay_behind(light.gathered, vec4(emitted(texel, alpha), alpha));
     }
 }
 
@@ -89,10 +87,9 @@ void march_piece(Path path, float from, float to, float per_depth, float start, 
         bvec3 wall = greaterThan(sigma, vec3(3.0e38));
         amount = alpha * (wall.x ? vec3(1.0, 0.0, 0.0) : wall.y ? vec3(0.0, 1.0, 0.0) : vec3(0.0, 0.0, 1.0));
     }
-    light.rgba += light.transmittance * vec4(emitted(texels[0], amount.x) + emitted(texels[1], amount.y)
-                                             + emitted(texels[2], amount.z), alpha);
-    light.depth += light.transmittance * dot(amount, z);
-    light.transmittance *= exp(-whole);
+    light.depth += transmittance(light.gathered) * dot(amount, z);
+    lay_behind(light.gathered, vec4(emitted(texels[0], amount.x) + emitted(texels[1], amount.y)
+                                    + emitted(texels[2], amount.z), alpha));
 }
 
 // Goes from plane to plane of texel centres, of both levels that are blended; dense pieces are cut further.
@@ -102,7 +99,7 @@ void march_exactly(Path path, vec2 segment, float per_depth, inout Light light) 
     Lattice coarse = lattice_of(path, min(level + 1.0, view.last_level), segment.x);
     float from = segment.x;
     float start = extinction(fetch(path, from));
-    while (from < segment.y && light.transmittance > 1e-7) {
+    while (from < segment.y && transmittance(light.gathered) > 1e-7) {
         float to = min(segment.y, first(fine.next));
         if (MINIFIED) to = min(to, first(coarse.next));
         pass(fine, to);

@@ -12,3 +12,22 @@ float opacity(float depth) {
     float series = depth * (1.0 - depth * (1.0 / 2.0 - depth * (1.0 / 6.0 - depth * (1.0 / 24.0))));
     return depth < 0.03125 ? series : 1.0 - exp(-depth);
 }
+
+// What a ray has gathered, front to back. Sums are compensated (Kahan 1965), so that the steps of a long path through a thin
+// medium, each of which would be rounded to the last bit of the sum, add up.
+struct Gathered {
+    vec4 rgba; // premultiplied
+    vec4 excess; // what rounding has added to it
+};
+
+// Of the light from behind. Never less exact than alpha itself; a product of transmittances would be, where each is next to 1.
+float transmittance(Gathered gathered) {
+    return max(1.0 - gathered.rgba.a, 0.0);
+}
+
+void lay_behind(inout Gathered gathered, vec4 rgba) {
+    precise vec4 added = transmittance(gathered) * rgba - gathered.excess;
+    precise vec4 sum = gathered.rgba + added;
+    precise vec4 excess = (sum - gathered.rgba) - added;
+    gathered = Gathered(sum, excess);
+}

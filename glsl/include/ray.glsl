@@ -5,6 +5,12 @@ vec3 pixel_ray() {
     return vec3((gl_FragCoord.xy - view.centre) * vec2(view.pixel, -view.pixel), 1.0);
 }
 
+// Whether a ray in the plane of a face counts as inside: as if it were moved to the right, and by far less down, so that of the
+// two cells at the face it is in one.
+bool is_beside(vec3 inward) {
+    return inward.x > 0.0 || (inward.x == 0.0 && inward.y > 0.0);
+}
+
 // Depths of entry and exit (Cyrus-Beck clipping), entry no nearer than the near plane; entry < exit where the ray meets the
 // tetrahedron. Cells that share a face hold the same plane, negated: one ends bit for bit where the other begins.
 vec2 interval(vec4 planes[4], vec3 ray) {
@@ -15,7 +21,7 @@ vec2 interval(vec4 planes[4], vec3 ray) {
         float depth = planes[i].w / towards_inside;
         if (towards_inside > 0.0) entry = max(entry, depth);
         else if (towards_inside < 0.0) exit = min(exit, depth);
-        else if (planes[i].w > 0.0) exit = entry; // parallel to the face, and outside
+        else if (planes[i].w > 0.0 || (planes[i].w == 0.0 && !is_beside(planes[i].xyz))) exit = entry; // parallel to the face
     }
     return vec2(entry, exit);
 }

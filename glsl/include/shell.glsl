@@ -1,14 +1,14 @@
 // What the shell shaders share with src/method/shell; tests/layout.rs compares the two from the SPIR-V.
 //
-// View space here: origin at the eye, x right, y up, z = depth *into* the picture.
+// View space here: origin at the eye, x right, y up, z = depth *into* the picture. Lengths are in parts of `Seen::unit`.
 
 layout(push_constant, std430) uniform View {
     vec2 centre;         // of the picture, in pixels
-    float pixel;         // distance of pixel centres at depth 1, world units
-    float near;          // depth of the near plane, world units
+    float pixel;         // distance of pixel centres at depth 1
+    float near;          // depth of the near plane
     vec3 texels;         // size of level 0 of the volume
     float last_level;
-    float lod_scale;     // footprint of a pixel at depth 1, world units
+    float lod_scale;     // footprint of a pixel at depth 1
     float per_opacity_distance; // 1 / opacity_distance
     float step;          // `default` plan: texels a sample
     uint samples;        // `paper` plan: samples a tetrahedron

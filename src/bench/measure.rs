@@ -146,7 +146,7 @@ impl Contender {
         let scene = Arc::new(Scene { march: setting.march, ..scene.clone() });
         let entry = method::by_name(&setting.method).expect("checked when the sweep was read");
         let silent: Arc<dyn Progress> = Arc::new(Silent);
-        let mut method = (entry.prepare)(scene.clone(), &Setup { progress: &silent, ..*setup })?;
+        let mut method = entry.prepare(scene.clone(), &Setup { progress: &silent, ..*setup })?;
         let start = Instant::now();
         let warm_up = method.render(&scene.view)?;
         Ok(Self { method, warm_up, milliseconds: 1e3 * start.elapsed().as_secs_f64() })

@@ -10,9 +10,10 @@ use super::report::{csv, html};
 use super::results::{Results, SceneResults};
 use super::sweep::Sweep;
 use crate::gpu::Gpu;
-use crate::method::Setup;
+use crate::method::{Entry, METHODS, Opened, Setup};
 use crate::progress::Silent;
-use crate::{Error, Result, scene};
+use crate::scene::{self, Sizes};
+use crate::{Error, Result};
 
 /// Where results go.
 #[derive(Debug, Clone, Copy)]
@@ -53,12 +54,15 @@ pub fn run(sweep: &Sweep, options: &Options<'_>, setup: &Setup<'_>) -> Result<Ou
     };
     let size = sweep.size.map(|[width, height]| format!("image.size=[{width}, {height}]"));
     let overrides: Vec<String> = size.into_iter().chain(sweep.define.iter().cloned()).collect();
-    // What keeps a scene from being loaded, or results from being written, is told before anything is measured.
+    // What keeps a scene from being drawn, or results from being written, is told before anything is measured.
+    let opened = opened(sweep, setup)?;
     for path in &sweep.scenes {
         setup.progress.stage(&format!("checking {}", path.display()));
         setup.interrupt.check()?;
-        scene::load(path, &overrides, &Silent)?;
+        let admit = |sizes: &Sizes| opened.iter().try_for_each(|method| method.admit(sizes));
+        scene::load_if(path, &overrides, &Silent, &admit)?;
     }
+    drop(opened);
     results.write(&json)?;
 
     let mut earlier = std::mem::take(&mut results.scenes).into_iter();
@@ -101,6 +105,12 @@ pub fn run(sweep: &Sweep, options: &Options<'_>, setup: &Setup<'_>) -> Result<Ou
     let report = options.out.join("report.html");
     write_whole(&report, |file| std::io::Write::write_all(file, page.as_bytes()))?;
     Ok(Outcome { results, warnings, report })
+}
+
+/// Every method of the sweep, without a scene.
+fn opened(sweep: &Sweep, setup: &Setup<'_>) -> Result<Vec<Box<dyn Opened>>> {
+    let used = |entry: &&Entry| sweep.settings.iter().any(|setting| setting.method == entry.name);
+    METHODS.iter().filter(used).map(|entry| (entry.open)(setup)).collect()
 }
 
 /// The results in a file, if they are of the same sweep on the same device as `fresh`.

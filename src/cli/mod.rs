@@ -9,6 +9,7 @@ mod mesh;
 mod output;
 mod progress;
 mod render;
+mod stress;
 mod volume;
 
 use std::io::IsTerminal;
@@ -19,7 +20,7 @@ use clap::{Args, Parser, Subcommand};
 const EXIT_CODES: &str = "\
 Exit codes:
   0    done
-  1    diff: the images differ by more than --threshold
+  1    diff: the images differ by more than --threshold; stress: a case fails
   2    the request makes no sense (an unknown option, a bad -D)
   3    an input file is missing, damaged or means something impossible
   4    no usable Vulkan device
@@ -60,6 +61,7 @@ enum Command {
     Volume(volume::Command),
     Diff(diff::Arguments),
     Bench(bench::Arguments),
+    Stress(stress::Arguments),
 }
 
 /// Runs what the arguments of this process ask for.
@@ -79,6 +81,7 @@ pub fn run() -> ExitCode {
         Command::Volume(command) => volume::run(command, talk).map(|()| ExitCode::SUCCESS),
         Command::Diff(arguments) => diff::run(arguments, talk),
         Command::Bench(arguments) => bench::run(arguments, talk).map(|()| ExitCode::SUCCESS),
+        Command::Stress(arguments) => stress::run(arguments, talk),
     };
     done.unwrap_or_else(|error| {
         let code = error.exit_code();

@@ -9,7 +9,7 @@ use mesoshell::frame::{Report, Stage, Stopwatch, file};
 use mesoshell::gpu::{DeviceChoice, Messages};
 use mesoshell::method::{self, METHODS, Setup};
 use mesoshell::progress::{Interrupt, Progress};
-use mesoshell::scene::{self, Loaded, View};
+use mesoshell::scene::{self, Loaded, Sizes, View};
 use mesoshell::value::PictureSize;
 use mesoshell::{Error, Result};
 use serde::Serialize;
@@ -83,20 +83,26 @@ fn render(arguments: &Arguments, progress: &Arc<dyn Progress>, interrupt: &Inter
     });
     file::check_writable(&output)?;
 
-    let Loaded { scene: mut loaded, background, mut stages } =
-        scene::load(scene, &arguments.define, progress.as_ref())?;
-    if let Some(PictureSize(size)) = arguments.size {
-        [loaded.view.width, loaded.view.height] = size.map(|side| side.0);
-    }
-    interrupt.check()?;
-
-    let view = loaded.view;
     let device = arguments.device.clone().unwrap_or_default();
     let messages = arguments.validate.then(Messages::default);
     let setup = Setup { device: &device, validation: messages.as_ref(), progress, interrupt };
     let mut watch = Stopwatch::start();
     let method = method::by_name(&arguments.method).expect("clap lets through the names of the table alone");
-    let mut method = (method.prepare)(Arc::new(loaded), &setup)?;
+    let method = (method.open)(&setup)?;
+    watch.lap("open");
+    let mut stages = watch.finish();
+
+    let size = arguments.size.map(|PictureSize(size)| size.map(|side| side.0));
+    let admit = |sizes: &Sizes| method.admit(&Sizes { picture: size.unwrap_or(sizes.picture), ..*sizes });
+    let Loaded { scene: mut loaded, background, stages: load } =
+        scene::load_if(scene, &arguments.define, progress.as_ref(), &admit)?;
+    stages.extend(load);
+    [loaded.view.width, loaded.view.height] = size.unwrap_or([loaded.view.width, loaded.view.height]);
+    let view = loaded.view;
+    interrupt.check()?;
+
+    let mut watch = Stopwatch::start();
+    let mut method = method.prepare(Arc::new(loaded))?;
     watch.lap("prepare");
     stages.extend(watch.finish());
 

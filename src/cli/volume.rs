@@ -1,4 +1,4 @@
-//! `mesoshell volume info`: what a volume file holds.
+//! `mesoshell volume info`: what a volume file or a recipe holds.
 
 use std::path::PathBuf;
 
@@ -9,9 +9,9 @@ use super::{Talk, table};
 
 #[derive(Subcommand)]
 pub enum Command {
-    /// Tell the size and the ranges of a volume file
+    /// Tell the size and the ranges of a volume
     Info {
-        /// A KTX2 or NRRD file, or a folder or pattern of PNG slices
+        /// A KTX2 or NRRD file, a folder or pattern of PNG slices, or a recipe (.toml)
         file: PathBuf,
     },
 }

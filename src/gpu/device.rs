@@ -9,6 +9,8 @@ use ash::vk;
 use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
 use serde::Serialize;
 
+use super::target::Target;
+use super::texture::{Texture3d, most_levels};
 use crate::{Error, Result};
 
 const VALIDATION_LAYER: &CStr = c"VK_LAYER_KHRONOS_validation";
@@ -57,7 +59,7 @@ pub struct DeviceInfo {
     pub uuid: String,
     /// `discrete`, `integrated`, `virtual`, `cpu` or `other`.
     pub kind: String,
-    /// Name and version of the driver.
+    /// Name and version of the driver; the number of its version where it does not tell its name.
     pub driver: String,
     /// The Vulkan version that it offers.
     pub api_version: String,
@@ -212,6 +214,28 @@ impl Instance {
             .collect())
     }
 
+    /// The driver's name and version, where it has `VK_KHR_driver_properties`, as about all of Vulkan 1.2 and later do.
+    fn driver(&self, handle: vk::PhysicalDevice) -> Option<String> {
+        // SAFETY: plain query on a handle of this instance.
+        let extensions = unsafe { self.raw.enumerate_device_extension_properties(handle) }.ok()?;
+        let tells = |extension: &vk::ExtensionProperties| {
+            extension.extension_name_as_c_str() == Ok(ash::khr::driver_properties::NAME)
+        };
+        // SAFETY: as above.
+        let api_version = unsafe { self.raw.get_physical_device_properties(handle) }.api_version;
+        if api_version < vk::API_VERSION_1_1 || !extensions.iter().any(tells) {
+            return None;
+        }
+        let mut driver = vk::PhysicalDeviceDriverProperties::default();
+        let mut all = vk::PhysicalDeviceProperties2::default().push_next(&mut driver);
+        // SAFETY: the device offers Vulkan 1.1, which has this query, and the extension of the structure.
+        unsafe { self.raw.get_physical_device_properties2(handle, &mut all) };
+        let parts = [driver.driver_name_as_c_str(), driver.driver_info_as_c_str()];
+        let parts = parts.map(|part| part.unwrap_or_default().to_string_lossy());
+        let told: Vec<&str> = parts.iter().map(|part| part.trim()).filter(|part| !part.is_empty()).collect();
+        (!told.is_empty()).then(|| told.join(" "))
+    }
+
     fn describe(&self, index: usize, handle: vk::PhysicalDevice) -> DeviceInfo {
         // SAFETY: plain queries on a handle of this instance.
         let (properties, memory) = unsafe {
@@ -226,6 +250,7 @@ impl Instance {
             // SAFETY: the device offers Vulkan 1.1, which has this query and this structure.
             unsafe { self.raw.get_physical_device_properties2(handle, &mut all) };
         }
+        let driver = self.driver(handle);
         let hex = |bytes: &[u8]| bytes.iter().map(|byte| format!("{byte:02x}")).collect::<String>();
         let uuid = id.device_uuid;
         let version = |version| {
@@ -248,7 +273,7 @@ impl Instance {
                 _ => "other",
             }
             .to_owned(),
-            driver: version(properties.driver_version),
+            driver: driver.unwrap_or_else(|| version(properties.driver_version)),
             api_version: version(properties.api_version),
             memory_bytes: memory
                 .memory_heaps_as_slice()
@@ -395,6 +420,17 @@ impl Gpu {
     /// The rasteriser's subpixels a pixel: it snaps vertices to this grid.
     pub fn subpixels(&self) -> u32 {
         1 << self.limits.sub_pixel_precision_bits
+    }
+
+    /// Refuses a picture or a volume that the device could not hold, of so many pixels or texels a side. What is asked here is
+    /// asked again when they are made; this is for asking before the volume is computed.
+    ///
+    /// # Errors
+    /// [`Error::Device`] where a side is too long, [`Error::OutOfMemory`].
+    pub fn check_sizes(&self, picture: [u32; 2], volume: [u32; 3]) -> Result<()> {
+        Target::check(self, picture[0], picture[1], 1)?;
+        Texture3d::check(self, "the volume", volume, most_levels(volume))?;
+        Ok(())
     }
 
     /// Whether images of `format` with optimal tiling can do all of `features`.

@@ -37,32 +37,8 @@ impl Target {
     /// # Panics
     /// Where there are no attachments, or more than the device draws into at once.
     pub fn new(gpu: &Arc<Gpu>, width: u32, height: u32, attachments: usize) -> Result<Self> {
-        if width.min(height) == 0 {
-            let message = format!("a picture of {width} x {height} pixels");
-            return Err(Error::Usage { message, help: Some("ask for at least one pixel a side".into()) });
-        }
-        let limits = &gpu.limits;
-        let limit = limits
-            .max_image_dimension2_d
-            .min(limits.max_framebuffer_width)
-            .min(limits.max_framebuffer_height);
-        if width.max(height) > limit {
-            return Err(Error::Device {
-                message: format!(
-                    "a picture of {width} x {height} pixels; {} draws at most {limit} a side",
-                    gpu.info().name
-                ),
-                help: Some("ask for a smaller picture".into()),
-            });
-        }
-        let features = vk::FormatFeatureFlags::COLOR_ATTACHMENT_BLEND | vk::FormatFeatureFlags::TRANSFER_SRC;
-        let format = Rgba::best(gpu, features).ok_or_else(|| Error::Device {
-            message: format!("{} blends into no floating-point target", gpu.info().name),
-            help: None,
-        })?;
-        let bytes = u64::from(width) * u64::from(height) * format.bytes();
-        gpu.check_memory("the picture", 2 * bytes * attachments as u64)?;
-        assert!((1..=limits.max_color_attachments as usize).contains(&attachments));
+        let (format, bytes) = Self::check(gpu, width, height, attachments)?;
+        assert!((1..=gpu.limits.max_color_attachments as usize).contains(&attachments));
 
         let info = vk::ImageCreateInfo::default()
             .image_type(vk::ImageType::TYPE_2D)
@@ -102,6 +78,36 @@ impl Target {
         target.framebuffer = unsafe { gpu.raw.create_framebuffer(&framebuffer_info, None) }
             .map_err(|error| vulkan_error("creating the framebuffer", error))?;
         Ok(target)
+    }
+
+    /// Whether the device can hold such a target: in which format, and of how many bytes an image.
+    pub(super) fn check(gpu: &Gpu, width: u32, height: u32, attachments: usize) -> Result<(Rgba, u64)> {
+        if width.min(height) == 0 {
+            let message = format!("a picture of {width} x {height} pixels");
+            return Err(Error::Usage { message, help: Some("ask for at least one pixel a side".into()) });
+        }
+        let limits = &gpu.limits;
+        let limit = limits
+            .max_image_dimension2_d
+            .min(limits.max_framebuffer_width)
+            .min(limits.max_framebuffer_height);
+        if width.max(height) > limit {
+            return Err(Error::Device {
+                message: format!(
+                    "a picture of {width} x {height} pixels; {} draws at most {limit} a side",
+                    gpu.info().name
+                ),
+                help: Some("ask for a smaller picture".into()),
+            });
+        }
+        let features = vk::FormatFeatureFlags::COLOR_ATTACHMENT_BLEND | vk::FormatFeatureFlags::TRANSFER_SRC;
+        let format = Rgba::best(gpu, features).ok_or_else(|| Error::Device {
+            message: format!("{} blends into no floating-point target", gpu.info().name),
+            help: None,
+        })?;
+        let bytes = u64::from(width) * u64::from(height) * format.bytes();
+        gpu.check_memory("the picture", 2 * bytes * attachments as u64)?;
+        Ok((format, bytes))
     }
 
     /// The pixels of one image as of the last draw, row by row from the top left.

@@ -47,28 +47,9 @@ impl Texture3d {
     pub fn upload(gpu: &Arc<Gpu>, name: &'static str, pyramid: &Pyramid) -> Result<Self> {
         assert_is_pyramid(pyramid);
         let [width, height, depth] = pyramid.levels[0].size;
-        let limit = gpu.limits.max_image_dimension3_d;
-        if width.max(height).max(depth) > limit {
-            return Err(Error::Device {
-                message: format!(
-                    "{name}: {width} x {height} x {depth} texels; {} takes 3D textures of at most {limit} a side",
-                    gpu.info().name
-                ),
-                help: Some("use a smaller volume or another device".into()),
-            });
-        }
-        let features =
-            vk::FormatFeatureFlags::SAMPLED_IMAGE_FILTER_LINEAR | vk::FormatFeatureFlags::TRANSFER_DST;
-        let format = Rgba::best(gpu, features).ok_or_else(|| Error::Device {
-            message: format!("{} filters no floating-point 3D texture", gpu.info().name),
-            help: None,
-        })?;
-        let texels: u64 = pyramid.levels.iter().map(|level| level.texels.len() as u64).sum();
-        let bytes = texels * format.bytes();
-        // Once on the device, once in the staging buffer.
-        gpu.check_memory(name, 2 * bytes)?;
-        let mut staging = Buffer::staging(gpu, name, bytes)?;
         let levels = u32::try_from(pyramid.levels.len()).expect("at most 32 levels");
+        let (format, bytes) = Self::check(gpu, name, pyramid.levels[0].size, levels)?;
+        let mut staging = Buffer::staging(gpu, name, bytes)?;
         let info = vk::ImageCreateInfo::default()
             .image_type(vk::ImageType::TYPE_3D)
             .format(format.raw())
@@ -121,19 +102,51 @@ impl Texture3d {
             .map_err(|error| vulkan_error("creating the volume's sampler", error))?;
         Ok(Self { image, sampler, gpu: gpu.clone() })
     }
+
+    /// Whether the device can hold a pyramid above `size` texels: in which format, and of how many bytes.
+    pub(super) fn check(gpu: &Gpu, name: &str, size: [u32; 3], levels: u32) -> Result<(Rgba, u64)> {
+        let [width, height, depth] = size;
+        let limit = gpu.limits.max_image_dimension3_d;
+        if width.max(height).max(depth) > limit {
+            return Err(Error::Device {
+                message: format!(
+                    "{name}: {width} x {height} x {depth} texels; {} takes 3D textures of at most {limit} a side",
+                    gpu.info().name
+                ),
+                help: Some("use a smaller volume or another device".into()),
+            });
+        }
+        let features =
+            vk::FormatFeatureFlags::SAMPLED_IMAGE_FILTER_LINEAR | vk::FormatFeatureFlags::TRANSFER_DST;
+        let format = Rgba::best(gpu, features).ok_or_else(|| Error::Device {
+            message: format!("{} filters no floating-point 3D texture", gpu.info().name),
+            help: None,
+        })?;
+        let texels =
+            |level: u32| size.map(|side: u32| u64::from((side >> level).max(1))).into_iter().product::<u64>();
+        let bytes = (0..levels).map(texels).sum::<u64>() * format.bytes();
+        // Once on the device, once in the staging buffer.
+        gpu.check_memory(name, 2 * bytes)?;
+        Ok((format, bytes))
+    }
 }
 
 /// Each level has the size that Vulkan gives a mip level, and as many texels.
 fn assert_is_pyramid(pyramid: &Pyramid) {
     let full = pyramid.levels[0].size;
     assert!(full.into_iter().all(|side| side > 0), "a volume of {full:?} texels");
-    let most = u32::BITS - full.into_iter().max().unwrap_or(0).leading_zeros();
+    let most = most_levels(full);
     assert!(pyramid.levels.len() <= most as usize, "a pyramid above {full:?} texels has {most} levels");
     for (level, volume) in pyramid.levels.iter().enumerate() {
         assert_eq!(volume.size, full.map(|side| (side >> level).max(1)), "level {level}");
         let texels = volume.size.into_iter().map(|side| side as usize).product::<usize>();
         assert_eq!(volume.texels.len(), texels, "level {level} of {:?} texels", volume.size);
     }
+}
+
+/// How many levels a whole pyramid has.
+pub(super) fn most_levels(size: [u32; 3]) -> u32 {
+    u32::BITS - size.into_iter().max().unwrap_or(0).leading_zeros()
 }
 
 /// Records that an image goes from one use to another, with all of its levels.

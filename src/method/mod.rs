@@ -10,7 +10,7 @@ use crate::Result;
 use crate::frame::Frame;
 use crate::gpu::{DeviceChoice, Messages};
 use crate::progress::{Interrupt, Progress, Silent};
-use crate::scene::{Scene, View};
+use crate::scene::{Scene, Sizes, View};
 
 /// What a method may use while it prepares and renders.
 #[derive(Clone, Copy)]
@@ -35,8 +35,23 @@ pub trait Method {
     fn render(&mut self, view: &View) -> Result<Frame>;
 }
 
-/// Takes a scene to a method: uploads it, builds what does not depend on the view.
-pub type Prepare = fn(Arc<Scene>, &Setup<'_>) -> Result<Box<dyn Method>>;
+/// A method that has no scene yet, with its device where it needs one.
+pub trait Opened {
+    /// Refuses what the device could not hold: to be asked before the volume is computed, which may take long.
+    ///
+    /// # Errors
+    /// [`Error::Device`](crate::Error::Device) and [`Error::OutOfMemory`](crate::Error::OutOfMemory).
+    fn admit(&self, sizes: &Sizes) -> Result<()>;
+
+    /// Takes a scene to the method: uploads it, builds what does not depend on the view.
+    ///
+    /// # Errors
+    /// As [`Opened::admit`].
+    fn prepare(self: Box<Self>, scene: Arc<Scene>) -> Result<Box<dyn Method>>;
+}
+
+/// Opens what a method runs on.
+pub type Open = fn(&Setup<'_>) -> Result<Box<dyn Opened>>;
 
 /// A line of the table of methods.
 pub struct Entry {
@@ -44,8 +59,18 @@ pub struct Entry {
     pub name: &'static str,
     /// One line for the help text.
     pub summary: &'static str,
-    /// See [`Prepare`].
-    pub prepare: Prepare,
+    /// See [`Open`].
+    pub open: Open,
+}
+
+impl Entry {
+    /// Opens the method and takes a scene to it.
+    ///
+    /// # Errors
+    /// [`Error::Device`](crate::Error::Device) and [`Error::OutOfMemory`](crate::Error::OutOfMemory).
+    pub fn prepare(&self, scene: Arc<Scene>, setup: &Setup<'_>) -> Result<Box<dyn Method>> {
+        (self.open)(setup)?.prepare(scene)
+    }
 }
 
 /// All methods; the first is the default.
@@ -53,12 +78,12 @@ pub const METHODS: &[Entry] = &[
     Entry {
         name: "shell",
         summary: "tetrahedra in visibility order, marched on the device",
-        prepare: shell::prepare,
+        open: shell::open,
     },
     Entry {
         name: "reference",
         summary: "the integral itself in f64, on the CPU; slow and exact",
-        prepare: reference::prepare,
+        open: reference::open,
     },
 ];
 
@@ -80,5 +105,5 @@ pub fn render(scene: Scene) -> Result<Frame> {
         progress: &progress,
         interrupt: &Interrupt::default(),
     };
-    shell::prepare(Arc::new(scene), &setup)?.render(&view)
+    shell::open(&setup)?.prepare(Arc::new(scene))?.render(&view)
 }

@@ -6,24 +6,39 @@ use super::{Method, Setup};
 use crate::Result;
 use crate::frame::Frame;
 use crate::progress::{Interrupt, Progress};
-use crate::scene::{Scene, View};
+use crate::scene::{Scene, Sizes, View};
+
+struct Opened {
+    progress: Arc<dyn Progress>,
+    interrupt: Interrupt,
+}
 
 struct Reference {
     scene: Arc<Scene>,
-    progress: Arc<dyn Progress>,
-    interrupt: Interrupt,
+    opened: Opened,
 }
 
 /// Needs no device.
 ///
 /// # Errors
 /// None.
-pub fn prepare(scene: Arc<Scene>, setup: &Setup<'_>) -> Result<Box<dyn Method>> {
-    Ok(Box::new(Reference { scene, progress: setup.progress.clone(), interrupt: setup.interrupt.clone() }))
+pub fn open(setup: &Setup<'_>) -> Result<Box<dyn super::Opened>> {
+    Ok(Box::new(Opened { progress: setup.progress.clone(), interrupt: setup.interrupt.clone() }))
+}
+
+impl super::Opened for Opened {
+    fn admit(&self, _: &Sizes) -> Result<()> {
+        Ok(())
+    }
+
+    fn prepare(self: Box<Self>, scene: Arc<Scene>) -> Result<Box<dyn Method>> {
+        Ok(Box::new(Reference { scene, opened: *self }))
+    }
 }
 
 impl Method for Reference {
     fn render(&mut self, view: &View) -> Result<Frame> {
-        crate::reference::render(&self.scene, view, self.progress.as_ref(), &self.interrupt)
+        let Opened { progress, interrupt } = &self.opened;
+        crate::reference::render(&self.scene, view, progress.as_ref(), interrupt)
     }
 }

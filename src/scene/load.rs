@@ -1,7 +1,7 @@
 //! From the text of a scene file to the [`Scene`] that it describes.
 
 use std::io::Read;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use glam::{DVec2, DVec3};
 use toml::Spanned;
@@ -9,7 +9,7 @@ use toml::Spanned;
 use super::camera::DEFAULT_NEAR;
 use super::file::{CameraSection, DensitySection, MeshSection, Plan, SceneFile, VolumeSection};
 use super::text::Text;
-use super::{Camera, March, Medium, Scene, View};
+use super::{Camera, March, Medium, Scene, Sizes, View};
 use crate::frame::{Stage, Stopwatch};
 use crate::mesh::generate::Generator;
 use crate::mesh::projection::Projection;
@@ -17,7 +17,8 @@ use crate::mesh::{Mesh, obj};
 use crate::progress::{Progress, Silent};
 use crate::shell::{Shell, ShellOptions};
 use crate::value::{Exactly, Finite};
-use crate::volume::{self, Interpretation, Pyramid, Volume, recipe};
+use crate::volume::recipe::{self, Recipe};
+use crate::volume::{self, Interpretation, Pyramid, Volume};
 use crate::{Error, Result};
 
 /// No scene file that a person wrote is longer, in bytes.
@@ -40,6 +41,20 @@ pub struct Loaded {
 /// [`Error::Input`] for a file that cannot be read, [`Error::Text`] for a scene that cannot be, with the spot,
 /// [`Error::Usage`] for an override that is to blame.
 pub fn load(path: &Path, overrides: &[String], progress: &dyn Progress) -> Result<Loaded> {
+    load_if(path, overrides, progress, &|_| Ok(()))
+}
+
+/// Loads a scene as [`load`] does, if `admit` lets it: it is asked once, as soon as the sizes are known, which for a recipe
+/// is before anything is computed, and for a volume file once that is read.
+///
+/// # Errors
+/// As [`load`], and that of `admit`.
+pub fn load_if(
+    path: &Path,
+    overrides: &[String],
+    progress: &dyn Progress,
+    admit: &dyn Fn(&Sizes) -> Result<()>,
+) -> Result<Loaded> {
     let unreadable = |error: std::io::Error| {
         Error::input(path, format!("the scene file cannot be read: {error}"))
             .with_help("check the path, or write the scene that docs/scene.md describes")
@@ -51,7 +66,7 @@ pub fn load(path: &Path, overrides: &[String], progress: &dyn Progress) -> Resul
         return Err(Error::input(path, "longer than 1 MiB: this is no scene file"));
     }
     let text = Text::new(&path.display().to_string(), text, overrides)?;
-    build(&text, path.parent().unwrap_or(Path::new("")), progress)
+    build(&text, path.parent().unwrap_or(Path::new("")), progress, admit)
 }
 
 /// Loads a scene from a text: `name` is what errors call it, `base_dir` where its paths start.
@@ -59,16 +74,26 @@ pub fn load(path: &Path, overrides: &[String], progress: &dyn Progress) -> Resul
 /// # Errors
 /// As [`load`].
 pub fn parse(name: &str, text: &str, base_dir: &Path) -> Result<Loaded> {
-    build(&Text::new(name, text.to_owned(), &[])?, base_dir, &Silent)
+    build(&Text::new(name, text.to_owned(), &[])?, base_dir, &Silent, &|_| Ok(()))
 }
 
-fn build(text: &Text, base_dir: &Path, progress: &dyn Progress) -> Result<Loaded> {
+fn build(
+    text: &Text,
+    base_dir: &Path,
+    progress: &dyn Progress,
+    admit: &dyn Fn(&Sizes) -> Result<()>,
+) -> Result<Loaded> {
     let mut stopwatch = Stopwatch::start();
     let file: SceneFile = text.parse(("mesh", "generator"))?;
     // All that the text alone can have wrong is told before a long load.
     let camera = file.camera.as_ref().map(|section| camera(text, section)).transpose()?;
     let mesh = MeshSource::of(text, &file.mesh)?;
-    let volume = VolumeSource::of(text, &file.volume)?;
+    let volume = VolumeSource::of(text, &file.volume, base_dir)?;
+    let [width, height] = file.image.size.0.map(|pixels| pixels.0);
+    let admit = |volume| admit(&Sizes { picture: [width, height], volume });
+    if let VolumeSource::Recipe(recipe) = &volume {
+        admit(recipe.header().size)?;
+    }
 
     progress.stage("loading the mesh");
     let mesh = mesh.load(base_dir)?;
@@ -90,7 +115,7 @@ fn build(text: &Text, base_dir: &Path, progress: &dyn Progress) -> Result<Loaded
     let section = file.volume.get_ref();
     // The path that a density of 1 makes one optical depth long.
     let mean_free_path = section.density.as_ref().map(|density| density.extinction.0.recip());
-    let volume = volume.load(base_dir)?;
+    let volume = volume.load(&admit)?;
     let texel_along_w = options.thickness / f64::from(volume.size[2]);
     stopwatch.lap("load.volume");
 
@@ -98,7 +123,6 @@ fn build(text: &Text, base_dir: &Path, progress: &dyn Progress) -> Result<Loaded
     let volume = Pyramid::build(volume);
     stopwatch.lap("load.pyramid");
 
-    let [width, height] = file.image.size.0.map(|pixels| pixels.0);
     let camera = camera.unwrap_or_else(|| Camera::framing(&shell.vertices));
     let scene = Scene {
         view: View { camera, width, height, depth: false },
@@ -152,18 +176,18 @@ impl<'a> MeshSource<'a> {
 }
 
 /// Where the volume comes from.
-enum VolumeSource<'a> {
-    Recipe(&'a Path),
-    File(&'a Path, Interpretation),
+enum VolumeSource {
+    Recipe(Recipe),
+    File(PathBuf, Interpretation),
 }
 
-impl<'a> VolumeSource<'a> {
-    fn of(text: &Text, section: &'a Spanned<VolumeSection>) -> Result<Self> {
+impl VolumeSource {
+    fn of(text: &Text, section: &Spanned<VolumeSection>, base_dir: &Path) -> Result<Self> {
         match section.get_ref() {
             VolumeSection {
                 recipe: Some(path), file: None, transfer: None, density: None, alpha: None, ..
             } => {
-                Ok(Self::Recipe(path))
+                Ok(Self::Recipe(recipe::load(base_dir.join(path))?))
             }
             VolumeSection { density: Some(_), opacity_distance: Some(_), .. } => Err(text.error(
                 section.span(),
@@ -179,7 +203,7 @@ impl<'a> VolumeSource<'a> {
                     constant_alpha: alpha.map(|alpha| alpha.0 as f32),
                     transfer: transfer.clone(),
                 };
-                Ok(Self::File(path, interpretation))
+                Ok(Self::File(base_dir.join(path), interpretation))
             }
             _ => Err(text.error(
                 section.span(),
@@ -188,11 +212,13 @@ impl<'a> VolumeSource<'a> {
         }
     }
 
-    fn load(self, base_dir: &Path) -> Result<Volume> {
+    fn load(self, admit: &dyn Fn([u32; 3]) -> Result<()>) -> Result<Volume> {
         match self {
-            Self::Recipe(path) => recipe::load(base_dir.join(path))?.build(),
+            Self::Recipe(recipe) => recipe.build(),
             Self::File(path, interpretation) => {
-                Volume::from_raw(volume::read(&base_dir.join(path))?, &interpretation)
+                let raw = volume::read(&path)?;
+                admit(raw.size)?;
+                Volume::from_raw(raw, &interpretation)
             }
         }
     }
@@ -245,7 +271,7 @@ recipe = "fog.toml"
 
     fn loaded(overrides: &[&str]) -> Result<Loaded> {
         let overrides: Vec<_> = overrides.iter().map(|&text| text.to_owned()).collect();
-        build(&Text::new("scene.toml", SCENE.to_owned(), &overrides)?, folder().path(), &Silent)
+        build(&Text::new("scene.toml", SCENE.to_owned(), &overrides)?, folder().path(), &Silent, &|_| Ok(()))
     }
 
     #[test]
@@ -382,9 +408,24 @@ recipe = "fog.toml"
     }
 
     #[test]
+    fn sizes_are_admitted_before_anything_is_built() {
+        let folder = folder();
+        // A recipe that would be computed for minutes, beside a mesh that is not even there.
+        std::fs::write(folder.path().join("fog.toml"), "recipe = \"fog\"\nsize = [2048, 512, 128]\n")
+            .unwrap();
+        let mesh = "generator = \"torus\"\nsegments = 8\nrings = 4";
+        let text = Text::new("scene.toml", SCENE.replace(mesh, "file = 'nowhere.obj'"), &[]).unwrap();
+        let refuse = |sizes: &Sizes| {
+            assert_eq!(*sizes, Sizes { picture: [512, 512], volume: [2048, 512, 128] });
+            Err(Error::Interrupted)
+        };
+        assert!(matches!(build(&text, folder.path(), &Silent, &refuse), Err(Error::Interrupted)));
+    }
+
+    #[test]
     fn a_mistake_in_the_file_is_not_blamed_on_an_override() {
         let text = Text::new("scene.toml", SCENE.replace("0.1", "0"), &["mesh.rings=9".to_owned()]).unwrap();
-        assert!(matches!(build(&text, folder().path(), &Silent), Err(Error::Text { .. })));
+        assert!(matches!(build(&text, folder().path(), &Silent, &|_| Ok(())), Err(Error::Text { .. })));
     }
 
     #[test]

@@ -23,7 +23,7 @@ pub mod load;
 pub(crate) mod text;
 
 pub use camera::{Camera, View};
-pub use load::{Loaded, load, parse};
+pub use load::{Loaded, load, load_if, parse};
 
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
@@ -44,6 +44,15 @@ pub struct Scene {
     pub view: View,
     /// How finely the `shell` method marches.
     pub march: March,
+}
+
+/// What a scene asks of a device, known before its volume is computed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Sizes {
+    /// Pixels across and down.
+    pub picture: [u32; 2],
+    /// Texels along u, v, w.
+    pub volume: [u32; 3],
 }
 
 /// What the texture means. It belongs to the medium, not to the march: the reference obeys it too.

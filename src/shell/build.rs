@@ -17,7 +17,7 @@ impl Shell {
     ///
     /// # Errors
     /// [`Error::Usage`] that names the option (`shell.thickness`, ...) or the part of the mesh that makes no
-    /// sense: a thickness that is not positive and finite, a list of the wrong length, a number that is
+    /// sense: a thickness that is not positive, finite and normal, a list of the wrong length, a number that is
     /// not finite, a triangle that names a position twice.
     pub fn build(mesh: &Mesh, options: &ShellOptions) -> Result<Self> {
         validate(mesh, options)?;
@@ -119,7 +119,8 @@ fn texture_coordinates(uvs: [DVec2; 3], outer: [bool; 4], corners: [u8; 4]) -> [
 fn validate(mesh: &Mesh, options: &ShellOptions) -> Result<()> {
     let usage = |message: String, help: &str| Err(Error::Usage { message, help: Some(help.into()) });
     let positions = mesh.positions.len();
-    if !(options.thickness > 0.0 && options.thickness.is_finite()) {
+    // A denormal thickness has lost its digits, and so would every map.
+    if !(options.thickness > 0.0 && options.thickness.is_normal()) {
         let message = format!("shell.thickness is {}", options.thickness);
         return usage(message, "give a positive, finite length in world units");
     }
@@ -188,7 +189,7 @@ mod tests {
 
     #[test]
     fn a_senseless_thickness_is_refused() {
-        for thickness in [0.0, -0.0, -1.0, f64::NAN, f64::INFINITY] {
+        for thickness in [0.0, -0.0, 1e-310, -1.0, f64::NAN, f64::INFINITY] {
             assert_refused("shell.thickness is", |options, _| options.thickness = thickness);
         }
     }

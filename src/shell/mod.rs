@@ -70,7 +70,7 @@ impl Cell {
 /// How the shell is built from the mesh.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ShellOptions {
-    /// World units; positive and finite.
+    /// World units; positive, finite and not denormal.
     pub thickness: f64,
     /// Factor on the thickness, one a position; empty means 1 everywhere.
     pub thickness_scale: Vec<f64>,

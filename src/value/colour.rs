@@ -8,6 +8,7 @@ use serde::de::value::SeqAccessDeserializer;
 use serde::de::{Deserializer, Error, SeqAccess, Unexpected, Visitor};
 
 use super::{Exactly, NotNegative};
+use crate::frame::srgb::linear_from_srgb;
 
 /// A colour in linear light; each of red, green and blue is finite and at least 0.
 ///
@@ -22,12 +23,9 @@ impl Colour {
         Self(Vec3::new(red, green, blue))
     }
 
-    /// The colour `0xrrggbb`, encoded in sRGB (IEC 61966-2-1).
+    /// The colour `0xrrggbb`, encoded in sRGB.
     pub fn srgb(hex: u32) -> Self {
-        let linear = |shift: u32| {
-            let encoded = (hex >> shift & 0xff) as f32 / 255.;
-            if encoded <= 0.04045 { encoded / 12.92 } else { ((encoded + 0.055) / 1.055).powf(2.4) }
-        };
+        let linear = |shift: u32| linear_from_srgb((hex >> shift & 0xff) as f32 / 255.);
         Self::linear(linear(16), linear(8), linear(0))
     }
 }

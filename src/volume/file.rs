@@ -5,7 +5,7 @@ use std::io::Read as _;
 use std::path::Path;
 
 use super::raw::unreadable;
-use super::{RawVolume, VolumeInfo, ktx2_file, nrrd, stack};
+use super::{AlphaMode, RawVolume, Volume, VolumeInfo, ktx2_file, nrrd, recipe, stack};
 use crate::{Error, Result};
 
 const PNG_MAGIC: &[u8] = b"\x89PNG\r\n\x1a\n";
@@ -36,10 +36,27 @@ pub fn read(path: &Path) -> Result<RawVolume> {
     }
 }
 
-/// What the volume at `path` is, read whole, so that its ranges are known.
+/// What the volume at `path` is, read whole, so that its ranges are known; a recipe, a file whose name ends in `.toml`,
+/// is computed, and its colours are premultiplied.
 ///
 /// # Errors
-/// As [`read`].
+/// As [`read`], and as [`recipe::load`] and [`Recipe::build`](recipe::Recipe::build).
 pub fn info(path: &Path) -> Result<VolumeInfo> {
-    Ok(read(path)?.info())
+    let is_recipe =
+        path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("toml")) && !path.is_dir();
+    if !is_recipe {
+        return Ok(read(path)?.info());
+    }
+    let recipe = recipe::load(path)?;
+    let Volume { size, texels, .. } = recipe.build()?;
+    let raw = RawVolume {
+        path: path.to_owned(),
+        format: format!("recipe \"{}\"", recipe.header().recipe),
+        size,
+        channels: 4,
+        values: texels.into_flattened(),
+        full_scale: 1.0,
+        alpha_mode: AlphaMode::Premultiplied,
+    };
+    Ok(raw.info())
 }

@@ -227,8 +227,14 @@ mod tests {
     #[test]
     fn all_that_was_measured_is_told() {
         let page = page(&results(), &[pictures()]);
-        let parts =
-            ["<b>order 2.00</b>, of 3 points", "paper plan (samples", "2.5e-3", "20.5", "a &lt;device&gt;", "1.2 s"];
+        let parts = [
+            "<b>order 2.00</b>, of 3 points",
+            "paper plan (samples",
+            "2.5e-3",
+            "20.5",
+            "a &lt;device&gt;",
+            "1.2 s",
+        ];
         for part in parts.into_iter().chain(["fog &amp; fur", "step 0.25", "1 sample", "+5e-1", "march (ms)"])
         {
             assert!(page.contains(part), "{part}");

@@ -20,7 +20,7 @@ use crate::frame::{Frame, Image, Report, Stopwatch};
 use crate::gpu::{Batch, Buffer, Draw, Gpu, Pipeline, PipelineInfo, Target, Texture3d, draw, shaders};
 use crate::order::{Sorted, Sorter};
 use crate::progress::{Interrupt, Progress};
-use crate::scene::{March, Scene, View};
+use crate::scene::{March, Scene, Sizes, View};
 use crate::volume::Quantity;
 
 /// The push constants of `glsl/include/shell.glsl`: see there for each member.
@@ -83,26 +83,35 @@ struct CanvasKind {
     cycles: bool,
 }
 
-/// Opens the device and uploads the scene.
+/// A device without a scene.
+struct Opened {
+    gpu: Arc<Gpu>,
+    progress: Arc<dyn Progress>,
+    interrupt: Interrupt,
+}
+
+/// Opens the device.
 ///
 /// # Errors
-/// [`Error::Device`](crate::Error::Device) and [`Error::OutOfMemory`](crate::Error::OutOfMemory): checked before anything
-/// is drawn.
-pub fn prepare(scene: Arc<Scene>, setup: &Setup<'_>) -> Result<Box<dyn Method>> {
+/// [`Error::Device`](crate::Error::Device) where there is none.
+pub fn open(setup: &Setup<'_>) -> Result<Box<dyn super::Opened>> {
     setup.progress.stage("opening the device");
     let gpu = Gpu::open(setup.device, setup.validation)?;
-    setup.progress.stage("uploading the volume");
-    let volume = Texture3d::upload(&gpu, "the volume", &scene.volume)?;
-    let sorter = Sorter::new(&scene.shell.topology);
-    Ok(Box::new(Shell {
-        scene,
-        gpu,
-        progress: setup.progress.clone(),
-        interrupt: setup.interrupt.clone(),
-        sorter,
-        volume,
-        canvas: None,
-    }))
+    Ok(Box::new(Opened { gpu, progress: setup.progress.clone(), interrupt: setup.interrupt.clone() }))
+}
+
+impl super::Opened for Opened {
+    fn admit(&self, sizes: &Sizes) -> Result<()> {
+        self.gpu.check_sizes(sizes.picture, sizes.volume)
+    }
+
+    fn prepare(self: Box<Self>, scene: Arc<Scene>) -> Result<Box<dyn Method>> {
+        let Self { gpu, progress, interrupt } = *self;
+        progress.stage("uploading the volume");
+        let volume = Texture3d::upload(&gpu, "the volume", &scene.volume)?;
+        let sorter = Sorter::new(&scene.shell.topology);
+        Ok(Box::new(Shell { scene, gpu, progress, interrupt, sorter, volume, canvas: None }))
+    }
 }
 
 impl Method for Shell {
@@ -140,7 +149,7 @@ impl Method for Shell {
             target: &canvas.target,
             buffers: &[&canvas.cells, &canvas.tiles, &canvas.members],
             textures: &[&self.volume],
-            push_constants: bytemuck::bytes_of(&constants(&self.scene, view)),
+            push_constants: bytemuck::bytes_of(&constants(&self.scene, view, seen.unit)),
             batches: &batches,
         })?;
         watch.lap("march");
@@ -152,7 +161,7 @@ impl Method for Shell {
         let rgba = canvas.target.read(0);
         let depth = view.depth.then(|| {
             let mean = |[weighted, _, _, alpha]: [f32; 4]| {
-                if alpha > 0.0 { weighted / alpha } else { f32::INFINITY }
+                if alpha > 0.0 { (seen.unit * f64::from(weighted / alpha)) as f32 } else { f32::INFINITY }
             };
             canvas.target.read(1).into_iter().map(mean).collect()
         });
@@ -259,7 +268,8 @@ fn plan(march: March) -> u32 {
     }
 }
 
-fn constants(scene: &Scene, view: &View) -> ViewConstants {
+/// `unit`: see [`Seen::unit`].
+fn constants(scene: &Scene, view: &View, unit: f64) -> ViewConstants {
     let pixel = view.pixel_at_unit_depth();
     let (step, samples) = match scene.march {
         March::Paper { samples } => (1.0, samples),
@@ -270,11 +280,11 @@ fn constants(scene: &Scene, view: &View) -> ViewConstants {
     ViewConstants {
         centre: [0.5 * view.width as f32, 0.5 * view.height as f32],
         pixel: pixel as f32,
-        near: view.camera.near as f32,
+        near: (view.camera.near / unit) as f32,
         texels: scene.volume.levels[0].size.map(|side| side as f32),
         last_level: (scene.volume.levels.len() - 1) as f32,
         lod_scale: (scene.medium.lod_footprint * pixel) as f32,
-        per_opacity_distance: scene.medium.opacity_distance.recip() as f32,
+        per_opacity_distance: (unit / scene.medium.opacity_distance) as f32,
         step: step as f32,
         samples,
     }

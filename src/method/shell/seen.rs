@@ -1,5 +1,6 @@
 //! A shell as seen from one eye: what the shaders need of each tetrahedron, front to back. Positions are taken relative to the
-//! eye in f64 before anything is f32, so that a scene far from the origin loses nothing.
+//! eye in f64 before anything is f32, so that a scene far from the origin loses nothing, and in parts of the scene's own reach, so
+//! that its scale changes nothing: not what f32 rounds, nor whether it overflows.
 
 use std::ops::Range;
 
@@ -63,6 +64,8 @@ pub struct Seen {
     pub beside: u64,
     /// Whether any level of detail but 0 is needed.
     pub minified: bool,
+    /// The unit of all lengths on the device, in world units: how far the shell reaches from the eye.
+    pub unit: f64,
 }
 
 impl Seen {
@@ -80,7 +83,7 @@ impl Seen {
                 has_volume.then(|| eye.cell(t, exit_faces))
             })
             .collect();
-        let mut seen = Self { cells: Vec::with_capacity(found.len()), ..Self::default() };
+        let mut seen = Self { cells: Vec::with_capacity(found.len()), unit: eye.unit, ..Self::default() };
         let mut done = 0;
         for cycle in &order.cycles {
             seen.add_sorted(&found[done..cycle.start]);
@@ -159,6 +162,8 @@ struct Eye<'a> {
     /// Rows: right, up, forward.
     view_from_world: DMat3,
     projection: Projection,
+    /// See [`Seen::unit`].
+    unit: f64,
 }
 
 impl<'a> Eye<'a> {
@@ -172,8 +177,10 @@ impl<'a> Eye<'a> {
             // are off by less than another half up to pictures of 2^13 pixels.
             margin: 2.0 / f64::from(subpixels),
         };
+        let distances = scene.shell.vertices.iter().map(|vertex| vertex.distance_squared(view.camera.eye));
         Self {
             scene,
+            unit: distances.fold(view.camera.near.powi(2), f64::max).sqrt(),
             position: view.camera.eye,
             view_from_world: DMat3::from_cols(frame.right, frame.up, frame.forward).transpose(),
             projection,
@@ -193,12 +200,12 @@ impl<'a> Eye<'a> {
             // From a vertex of the face that both its cells choose: planes of a shared face are equal up to their sign.
             let on_face = shell.vertices[shell.face(t, k)[0] as usize] - self.position;
             let normal = planes[k].truncate();
-            (self.view_from_world * normal).as_vec3().extend(normal.dot(on_face) as f32).into()
+            (self.view_from_world * normal).as_vec3().extend((normal.dot(on_face) / self.unit) as f32).into()
         });
         let texture_from_view = shell.cells[t].texture_from_world * self.view_from_world.transpose();
         let texture_at_eye = shell.texture[t][0] - texture_from_view * vertices[0];
         let texture = std::array::from_fn(|i| {
-            texture_from_view.row(i).as_vec3().extend(texture_at_eye[i] as f32).into()
+            (texture_from_view.row(i) * self.unit).as_vec3().extend(texture_at_eye[i] as f32).into()
         });
         let cell = Cell { outline: [[a.x, a.y, b.x, b.y], [c.x, c.y, d.x, d.y]], planes, texture };
         let farthest = vertices.iter().map(|vertex| vertex.z).fold(f64::NEG_INFINITY, f64::max);
