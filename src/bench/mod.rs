@@ -1,6 +1,6 @@
 //! Measurements: run time against error.
 //!
-//! A [`Sweep`] says which scenes are measured at which [`Setting`]s; [`run`] measures it, and writes what it found as
+//! A [`Sweep`] says which scenes are measured at which [`Setting`]s; [`run()`] measures it, and writes what it found as
 //! JSON, CSV and a report in HTML. Times are taken in rounds over all points of a scene ([`mod@measure`]), errors against
 //! the f64 reference, whose pictures are kept in a [`cache`]. `docs/bench.md` describes the files key by key.
 

@@ -153,12 +153,12 @@ fn gallery(page: &mut String, scene: &SceneResults, pictures: &Pictures) {
         .zip(["most accurate", "least accurate"])
     {
         let point = &scene.points[index];
-        let level = format!("{} plan, {}", point.setting.plan(), point.setting.level());
+        let quality = point.setting.quality();
         let image = thumbnail(image);
-        shown(page, &image, pictures.background, &format!("{title}: {level}"));
+        shown(page, &image, pictures.background, &format!("{title}: {quality}"));
         *page += "</figure>\n";
         let ErrorMap { image: map, range } = error_map(&image, &reference, pictures.background);
-        shown(page, &map, None, &format!("its error in luminance: {level}"));
+        shown(page, &map, None, &format!("its error in luminance: {quality}"));
         let _ = writeln!(
             page,
             "<div class=\"range\"><span>−{range:e} darker</span><i></i><span>brighter +{range:e}</span></div></figure>"
@@ -182,13 +182,7 @@ fn stages(page: &mut String, scene: &SceneResults) {
     *page += "</tr></thead>\n<tbody>\n";
     for point in &scene.points {
         let setting = &point.setting;
-        let _ = write!(
-            page,
-            "<tr><th scope=\"row\">{}, {} plan, {}</th>",
-            escape(&setting.method),
-            setting.plan(),
-            setting.level()
-        );
+        let _ = write!(page, "<tr><th scope=\"row\">{}, {}</th>", escape(&setting.method), setting.quality());
         for name in &names {
             let stage = point.stages.iter().find(|stage| stage.name == *name);
             let _ = match stage {

@@ -6,8 +6,8 @@ mod picture;
 mod plot;
 
 /// Names of errors in the order in which they are shown, and what people call them. Others follow by their own name.
-const ERRORS: [(&str, &str); 4] =
-    [("rmse", "RMSE"), ("p999", "99.9 %"), ("max", "max"), ("psnr", "PSNR (dB)")];
+const ERRORS: [(&str, &str); 5] =
+    [("rmse", "RMSE"), ("p999", "99.9 %"), ("max", "max"), ("psnr", "PSNR (dB)"), ("flip", "FLIP")];
 
 /// The names of all errors of a point, those of [`ERRORS`] first. The number of pixels is none.
 fn error_names(point: &super::Point) -> Vec<String> {
