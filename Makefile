@@ -1,15 +1,21 @@
-# make demo renders the first picture, make test runs every test; both first install what the machine lacks.
+# make demo renders the first picture, make test runs every test, make bench measures time against error; all first
+# install what the machine lacks.
 
 CARGO ?= cargo
 TARGET := $(or $(CARGO_TARGET_DIR),target)
 
-.PHONY: demo test setup setup-test
+.PHONY: demo test bench setup setup-test
 
 demo: setup
 	$(CARGO) build --release
 	@mkdir -p out
 	$(TARGET)/release/mesoshell render scenes/fur-sphere.toml -o out/fur-sphere.png
 	@echo "the picture is in out/fur-sphere.png"
+
+bench: setup
+	$(CARGO) build --release
+	$(TARGET)/release/mesoshell bench benches/default.toml --output out/bench
+	@echo "the report is in out/bench/report.html"
 
 test: setup-test
 	$(CARGO) test --release

@@ -1,31 +1,48 @@
-//! `mesoshell bench`: run time and error of the default plan at falling steps, scene by scene.
+//! `mesoshell bench`: run time against error, of a sweep or of some scenes.
 
-use std::path::PathBuf;
-use std::sync::Arc;
+use std::io::{IsTerminal, stderr};
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
 
 use clap::Args;
-use mesoshell::bench::{self, StepPoint};
+use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressStyle};
+use mesoshell::bench::{self, Levels, Options, Results, Sweep, sweep};
 use mesoshell::gpu::DeviceChoice;
-use mesoshell::method::Setup;
+use mesoshell::method::{METHODS, Setup};
 use mesoshell::progress::{Interrupt, Progress};
-use mesoshell::{Result, scene};
-use serde::Serialize;
+use mesoshell::{Error, Result};
 
-use super::Talk;
-use super::progress::{Line, listen};
+use super::progress::listen;
+use super::{Talk, output};
 
-/// Measure time against error: the shell method at several steps, compared with the reference
+/// Measure time against error: a sweep over scenes, methods and levels of quality, compared with the reference
 #[derive(Args)]
 pub struct Arguments {
-    /// Scene files
-    #[arg(required = true)]
-    scenes: Vec<PathBuf>,
-    /// Texels a sample, for each row of the table
-    #[arg(long, value_delimiter = ',', default_values_t = [2.0, 1.0, 0.5, 0.25, 0.125])]
-    steps: Vec<f64>,
-    /// Frames timed a row; the median counts
-    #[arg(long, default_value_t = 3)]
-    runs: usize,
+    /// A sweep file (docs/bench.md lists its keys), or scene files
+    #[arg(default_value = "benches/default.toml", value_name = "SWEEP|SCENE")]
+    files: Vec<PathBuf>,
+    /// Steps of the default plan, in texels, for scene files: by default 2,1,0.5,0.25,0.125
+    #[arg(long, value_delimiter = ',', value_name = "LIST")]
+    steps: Option<Vec<f64>>,
+    /// Samples in a tetrahedron by the paper's plan, for scene files: by default none
+    #[arg(long, value_delimiter = ',', value_name = "LIST")]
+    samples: Option<Vec<u32>>,
+    /// Measure the exact plan too, for scene files
+    #[arg(long)]
+    exact: bool,
+    /// Frames timed a point; by default as the sweep says, or 3
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    runs: Option<u32>,
+    /// Folder of results.json, results.csv and report.html
+    #[arg(long, short, default_value = "out/bench", value_name = "DIR")]
+    output: PathBuf,
+    /// Folder where the reference's pictures are kept; by default `cache` in the results' folder
+    #[arg(long, value_name = "DIR")]
+    cache: Option<PathBuf>,
+    /// Go on with the results that an interrupted run left
+    #[arg(long)]
+    resume: bool,
     /// Set a key of every scene: -D image.size=[256,256]
     #[arg(short = 'D', value_name = "KEY=VALUE")]
     define: Vec<String>,
@@ -34,42 +51,140 @@ pub struct Arguments {
     device: Option<DeviceChoice>,
 }
 
-/// The rows of one scene.
-#[derive(Serialize)]
-struct Measured {
-    scene: PathBuf,
-    points: Vec<StepPoint>,
-}
-
 /// # Errors
 /// Whatever stands between a scene and its picture.
 pub fn run(arguments: Arguments, talk: Talk) -> Result<()> {
+    let sweep = what(&arguments)?;
     let interrupt = Interrupt::default();
     listen(&interrupt);
-    let progress: Arc<dyn Progress> = Arc::new(Line::new(talk));
+    let bar = Arc::new(Bar::new(talk));
+    let progress: Arc<dyn Progress> = bar.clone();
     let device = arguments.device.clone().unwrap_or_default();
+    let cache = arguments.cache.clone().unwrap_or_else(|| arguments.output.join("cache"));
+    let options = Options { out: &arguments.output, cache: &cache, resume: arguments.resume };
     let setup = Setup { device: &device, validation: None, progress: &progress, interrupt: &interrupt };
-    let mut measured = Vec::new();
-    for path in &arguments.scenes {
-        let scene = Arc::new(scene::load(path, &arguments.define, progress.as_ref())?.scene);
-        let reference = bench::reference(&scene, &setup)?;
-        let points = bench::steps(&scene, &reference, &arguments.steps, arguments.runs.max(1), &setup)?;
-        measured.push(Measured { scene: path.clone(), points });
+    let outcome = bench::run(&sweep, &options, &setup);
+    bar.bar.finish_and_clear(); // The line is wiped before anything else is said.
+    if matches!(outcome, Err(Error::Interrupted)) {
+        talk.warn("what was measured is kept: go on with --resume");
     }
-    drop(progress); // The progress line is wiped before anything else is said.
-    talk.result(&measured, || {
-        let mut table =
-            "| scene | step (texels) | time (ms) | RMSE | 99.9 % | max |\n|---|---|---|---|---|---|\n"
-                .to_owned();
-        for Measured { scene, points } in &measured {
-            let name = scene.file_stem().unwrap_or_default().to_string_lossy();
-            for StepPoint { step, milliseconds, metrics } in points {
-                table += &format!(
-                    "| {name} | {step} | {milliseconds:.0} | {:.1e} | {:.1e} | {:.1e} |\n",
-                    metrics.rmse, metrics.p999, metrics.max
-                );
+    let outcome = outcome?;
+    for warning in &outcome.warnings {
+        talk.warn(warning);
+    }
+    talk.result(&outcome.results, || format!("{}\n\n{}", table(&outcome.results), outcome.report.display()))
+}
+
+/// The sweep that the files and options ask for.
+fn what(arguments: &Arguments) -> Result<Sweep> {
+    let usage =
+        |message: &str, help: &str| Error::Usage { message: message.to_owned(), help: Some(help.to_owned()) };
+    let is_sweep =
+        |path: &Path| std::fs::read_to_string(path).is_ok_and(|text| sweep::looks_like_sweep(&text));
+    let levels_given = arguments.steps.is_some() || arguments.samples.is_some() || arguments.exact;
+    let mut sweep = match arguments.files.as_slice() {
+        [file] if is_sweep(file) => {
+            if levels_given {
+                return Err(usage(
+                    "a sweep file says itself what is measured",
+                    "change its [plans], or name scenes",
+                ));
             }
+            Sweep::load(file)?
         }
-        table.trim_end().to_owned()
-    })
+        files if files.iter().any(|file| is_sweep(file)) => {
+            return Err(usage("a sweep file stands alone", "name either one sweep file or scene files"));
+        }
+        scenes => Sweep::of_scenes(scenes, &[METHODS[0].name], &levels(arguments)?),
+    };
+    sweep.runs = arguments.runs.unwrap_or(sweep.runs);
+    sweep.define.extend(arguments.define.iter().cloned());
+    Ok(sweep)
+}
+
+/// The levels for scene files.
+fn levels(arguments: &Arguments) -> Result<Levels> {
+    let steps = arguments.steps.clone().unwrap_or_else(|| match arguments.samples {
+        Some(_) => Vec::new(),
+        None => Levels::default().steps,
+    });
+    let samples = arguments.samples.clone().unwrap_or_default();
+    let levels = Levels { steps, samples, exact: arguments.exact };
+    levels.check().map(|()| levels)
+}
+
+/// A line for each point, in Markdown.
+fn table(results: &Results) -> String {
+    let mut table =
+        "| scene | plan | level | time (ms) | RMSE | 99.9 % | max |\n|---|---|---|---|---|---|---|\n"
+            .to_owned();
+    for scene in &results.scenes {
+        for point in &scene.points {
+            table += &format!(
+                "| {} | {} | {} | {:.0} | {:.1e} | {:.1e} | {:.1e} |\n",
+                scene.name(),
+                point.setting.plan(),
+                point.setting.level(),
+                point.time.median,
+                point.rmse(),
+                point.error("p999"),
+                point.error("max")
+            );
+        }
+    }
+    table.trim_end().to_owned()
+}
+
+/// How much of the sweep is done, what is measured now, and how long the rest takes: one line that is drawn over on a
+/// terminal, else one line a stage.
+struct Bar {
+    bar: ProgressBar,
+    prints_stages: bool,
+    begun: Instant,
+    /// What is measured now, and what part of all is done.
+    now: Mutex<(String, f64)>,
+}
+
+impl Bar {
+    fn new(talk: Talk) -> Self {
+        let is_terminal = stderr().is_terminal();
+        let target = match talk.quiet || !is_terminal {
+            true => ProgressDrawTarget::hidden(),
+            false => ProgressDrawTarget::stderr(),
+        };
+        let bar = ProgressBar::with_draw_target(Some(1000), target);
+        let style = ProgressStyle::with_template("{bar:24.dim} {elapsed} {msg}").expect("a valid template");
+        bar.set_style(style);
+        bar.enable_steady_tick(Duration::from_millis(200));
+        let prints_stages = !is_terminal && !talk.quiet;
+        Self { bar, prints_stages, begun: Instant::now(), now: Mutex::new((String::new(), 0.0)) }
+    }
+
+    fn left(&self, done: f64) -> String {
+        if done <= 0.0 {
+            return String::new();
+        }
+        let left = self.begun.elapsed().as_secs_f64() * (1.0 - done) / done;
+        // What has hardly begun may claim to take ages.
+        format!(", about {} left", HumanDuration(Duration::from_secs_f64(left.min(1e9))))
+    }
+}
+
+impl Progress for Bar {
+    fn stage(&self, name: &str) {
+        let mut now = self.now.lock().unwrap_or_else(PoisonError::into_inner);
+        now.0 = name.to_owned();
+        let message = format!("{name}{}", self.left(now.1));
+        if self.prints_stages {
+            output::complain(&message);
+        }
+        self.bar.set_message(message);
+    }
+
+    fn fraction(&self, done: f64) {
+        let mut now = self.now.lock().unwrap_or_else(PoisonError::into_inner);
+        now.1 = done.clamp(0.0, 1.0);
+        self.bar.set_position((1000.0 * now.1) as u64);
+        self.bar.set_message(format!("{}{}", now.0, self.left(now.1)));
+    }
 }

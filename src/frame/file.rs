@@ -139,7 +139,12 @@ fn check_numbers(path: &Path, image: &Image) -> Result<()> {
     }
 }
 
-fn write_png(writer: impl Write, image: &Image, background: Option<[f32; 3]>) -> Result<(), ImageError> {
+/// The PNG that [`write()`] makes of an image without values that are not numbers.
+pub(crate) fn write_png(
+    writer: impl Write,
+    image: &Image,
+    background: Option<[f32; 3]>,
+) -> Result<(), ImageError> {
     let (width, height) = (image.width, image.height);
     let encoder = PngEncoder::new(writer);
     let byte = |x: f32| (255.0 * x.clamp(0.0, 1.0)).round() as u8;

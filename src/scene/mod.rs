@@ -20,12 +20,13 @@
 pub mod camera;
 pub mod file;
 pub mod load;
-mod text;
+pub(crate) mod text;
 
 pub use camera::{Camera, View};
 pub use load::{Loaded, load, load_if, parse};
 
 use glam::DVec3;
+use serde::{Deserialize, Serialize};
 
 use crate::shell::Shell;
 use crate::volume::Pyramid;
@@ -71,7 +72,8 @@ pub struct Medium {
 }
 
 /// How samples are spread along a ray in one tetrahedron.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "plan", rename_all = "kebab-case")]
 pub enum March {
     /// The 2005 paper, section 5.1: the same number of samples in every tetrahedron.
     Paper {

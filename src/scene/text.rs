@@ -57,6 +57,18 @@ impl Text {
     pub fn parse<T: DeserializeOwned>(&self, tagged: (&str, &str)) -> Result<T> {
         let mut root = self.tree()?;
         nest_variant(root.get_mut(), tagged);
+        self.read(root)
+    }
+
+    /// As [`parse`](Self::parse), of a text without a section that selects a variant.
+    ///
+    /// # Errors
+    /// As [`parse`](Self::parse).
+    pub fn parse_plain<T: DeserializeOwned>(&self) -> Result<T> {
+        self.read(self.tree()?)
+    }
+
+    fn read<T: DeserializeOwned>(&self, root: Spanned<DeTable<'_>>) -> Result<T> {
         let span = root.span();
         let root = Spanned::new(span, DeValue::Table(root.into_inner()));
         T::deserialize(ValueDeserializer::from(root)).map_err(|error| self.blame(&error))

@@ -8,5 +8,5 @@ pub use colour::Colour;
 pub use list::Exactly;
 pub(crate) use list::exactly;
 pub use number::{
-    FieldOfView, Finite, Fraction, NotNegative, PictureSize, Pixels, Positive, Rounds, Samples, Step,
+    FieldOfView, Finite, Fraction, NotNegative, PictureSize, Pixels, Positive, Rounds, Runs, Samples, Step,
 };

@@ -104,6 +104,10 @@ count! {
     /// Samples in one tetrahedron.
     Samples = 1..=4096
 }
+count! {
+    /// Timed frames of one point of a benchmark.
+    Runs = 1..=1000
+}
 
 /// Width and height of a picture that fits into memory: at most 2^28 pixels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]

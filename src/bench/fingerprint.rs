@@ -1,0 +1,161 @@
+//! Fingerprints: 128 bits of BLAKE3 over named fields, the same on every run. Two things of one fingerprint are taken for
+//! the same thing.
+
+use std::fmt;
+
+use bytemuck::NoUninit;
+use serde::{Deserialize, Serialize};
+
+use crate::reference::TOLERANCE;
+use crate::scene::{Medium, Scene, View};
+use crate::volume::Quantity;
+
+/// The code that a cached reference comes from: were it changed, so might its pictures be.
+const REFERENCE_CODE: [(&str, &str); 5] = [
+    ("crossing.rs", include_str!("../reference/crossing.rs")),
+    ("integrate.rs", include_str!("../reference/integrate.rs")),
+    ("mod.rs", include_str!("../reference/mod.rs")),
+    ("quadrature.rs", include_str!("../reference/quadrature.rs")),
+    ("texture.rs", include_str!("../reference/texture.rs")),
+];
+
+/// Written as 32 hexadecimal digits.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct Fingerprint(String);
+
+impl fmt::Display for Fingerprint {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str(&self.0)
+    }
+}
+
+/// Takes in one field after another.
+pub struct Builder(blake3::Hasher);
+
+impl Builder {
+    /// Adds a field; its length goes in too, so that two fields never run into one.
+    #[must_use]
+    pub fn bytes(mut self, bytes: &[u8]) -> Self {
+        self.0.update(&(bytes.len() as u64).to_le_bytes()).update(bytes);
+        self
+    }
+
+    /// Adds a field of numbers, bit by bit.
+    #[must_use]
+    pub fn numbers<T: NoUninit>(self, numbers: &[T]) -> Self {
+        self.bytes(bytemuck::cast_slice(numbers))
+    }
+
+    /// The fingerprint of the fields so far.
+    pub fn finish(self) -> Fingerprint {
+        Fingerprint(self.0.finalize().to_hex()[..32].to_owned())
+    }
+}
+
+impl Fingerprint {
+    /// Begins a fingerprint of a `kind` of thing; different kinds never share one.
+    pub fn builder(kind: &str) -> Builder {
+        Builder(blake3::Hasher::new()).bytes(kind.as_bytes())
+    }
+
+    /// Of everything that the reference's picture of `view` depends on: geometry, texture, medium, camera, and the
+    /// reference itself. How finely a method marches is not among it.
+    pub fn of_reference(scene: &Scene, view: &View) -> Self {
+        let mut builder = Self::builder("reference").bytes(env!("CARGO_PKG_VERSION").as_bytes());
+        for (_, code) in REFERENCE_CODE {
+            builder = builder.bytes(code.as_bytes());
+        }
+        let Medium { opacity_distance, lod_footprint } = scene.medium;
+        let View { camera, width, height, depth: _ } = view;
+        builder = builder
+            .numbers(&[TOLERANCE, opacity_distance, lod_footprint, camera.fov_y, camera.near])
+            .numbers(&[camera.eye, camera.target, camera.up])
+            .numbers(&[*width, *height])
+            .numbers(&scene.shell.topology.tetrahedra)
+            .numbers(&scene.shell.vertices)
+            .numbers(&scene.shell.texture);
+        for cell in &scene.shell.cells {
+            builder = builder.numbers(&cell.gradients).numbers(&[cell.texture_from_world]);
+        }
+        for level in &scene.volume.levels {
+            let quantity = match level.quantity {
+                Quantity::Opacity => "opacity",
+                Quantity::Extinction => "extinction",
+            };
+            builder = builder.bytes(quantity.as_bytes()).numbers(&level.size).numbers(&level.texels);
+        }
+        builder.finish()
+    }
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::*;
+    use crate::mesh::generate::{Generator, Torus};
+    use crate::scene::March;
+    use crate::shell::{Shell, ShellOptions};
+    use crate::volume::{Pyramid, Volume};
+
+    /// A torus of fog in 32 x 32 pixels.
+    pub(crate) fn scene() -> Scene {
+        let mesh = Generator::Torus(Torus { segments: 8, rings: 5, ..Torus::default() }).build().unwrap();
+        let shell = Shell::build(&mesh, &ShellOptions::new(0.2)).unwrap();
+        let texels = (0..8).map(|i| [0.1, 0.05, 0.0, 0.1 + 0.05 * i as f32]).collect();
+        let mut scene = Scene::new(shell, Pyramid::build(Volume::new([2, 2, 2], texels).unwrap()), 0.2);
+        (scene.view.width, scene.view.height) = (32, 32);
+        scene
+    }
+
+    /// A change, and its name for the failure's sake.
+    type Change = (&'static str, fn(&mut Scene));
+
+    const CHANGES: &[Change] = &[
+        ("a vertex", |scene| scene.shell.vertices[3].y = scene.shell.vertices[3].y.next_up()),
+        ("a texture coordinate", |scene| scene.shell.texture[7][2].z += 1e-15),
+        ("a cell", |scene| scene.shell.cells[5].texture_from_world.x_axis.x += 1e-9),
+        ("a texel of the first level", |scene| scene.volume.levels[0].texels[6][1] += 1e-6),
+        ("a texel of the last level", |scene| scene.volume.levels[1].texels[0][3] += 1e-6),
+        ("the shape of a level", |scene| scene.volume.levels[0].size = [1, 2, 4]),
+        ("what alpha is", |scene| scene.volume.levels[0].quantity = Quantity::Extinction),
+        ("the opacity distance", |scene| scene.medium.opacity_distance *= 2.0),
+        ("the level of detail", |scene| scene.medium.lod_footprint = 0.0),
+        ("the eye", |scene| scene.view.camera.eye.x += 1e-9),
+        ("the near plane", |scene| scene.view.camera.near *= 2.0),
+        ("the width", |scene| scene.view.width += 1),
+        ("the sides", |scene| (scene.view.width, scene.view.height) = (16, 64)),
+    ];
+
+    #[test]
+    fn every_change_of_the_picture_is_seen_and_no_other() {
+        let print = |scene: &Scene| Fingerprint::of_reference(scene, &scene.view);
+        let original = print(&scene());
+        assert_eq!(original.to_string().len(), 32);
+        assert_eq!(original, print(&scene()));
+        for (name, change) in CHANGES {
+            let mut changed = scene();
+            change(&mut changed);
+            assert_ne!(original, print(&changed), "{name}");
+        }
+        let finer = Scene { march: March::Paper { samples: 3 }, ..scene() };
+        assert_eq!(original, print(&finer));
+    }
+
+    #[test]
+    fn fields_do_not_run_together() {
+        let print = |fields: [&str; 2]| {
+            Fingerprint::builder("test").bytes(fields[0].as_bytes()).bytes(fields[1].as_bytes()).finish()
+        };
+        assert_ne!(print(["ab", "c"]), print(["a", "bc"]));
+    }
+
+    #[test]
+    fn all_code_of_the_reference_counts() {
+        let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("src/reference");
+        let entries = std::fs::read_dir(folder).unwrap();
+        let mut files: Vec<_> =
+            entries.map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
+        files.sort();
+        assert_eq!(files, REFERENCE_CODE.map(|(name, _)| name));
+    }
+}

@@ -1,0 +1,124 @@
+//! A whole sweep, scene by scene, kept on disk after each round.
+
+use std::path::{Path, PathBuf};
+
+use super::environment::Environment;
+use super::file::write_whole;
+use super::measure::{Subject, measure};
+use super::remaining::Remaining;
+use super::report::{csv, html};
+use super::results::{Results, SceneResults};
+use super::sweep::Sweep;
+use crate::gpu::Gpu;
+use crate::method::Setup;
+use crate::progress::Silent;
+use crate::{Error, Result, scene};
+
+/// Where results go.
+#[derive(Debug, Clone, Copy)]
+pub struct Options<'a> {
+    /// The folder of `results.json`, `results.csv` and `report.html`.
+    pub out: &'a Path,
+    /// The folder of the references' pictures.
+    pub cache: &'a Path,
+    /// Whether to go on with the `results.json` that is there.
+    pub resume: bool,
+}
+
+/// What a sweep ended with.
+#[derive(Debug, Clone)]
+pub struct Outcome {
+    /// What was measured; `results.json` holds the same.
+    pub results: Results,
+    /// What the user should know, each a sentence.
+    pub warnings: Vec<String>,
+    /// The report in HTML.
+    pub report: PathBuf,
+}
+
+/// Measures a sweep and writes its results.
+///
+/// `results.json` is written after each round of each scene: it keeps what was measured before an error or an interrupt.
+///
+/// # Errors
+/// Whatever stands between a scene and its picture; [`Error::Usage`] where the results to resume are of another sweep or
+/// device; [`Error::Output`].
+pub fn run(sweep: &Sweep, options: &Options<'_>, setup: &Setup<'_>) -> Result<Outcome> {
+    let json = options.out.join("results.json");
+    let device = Gpu::open(setup.device, setup.validation)?.info().clone();
+    let fresh = Results::new(sweep.clone(), Environment::here(&device));
+    let mut results = match options.resume {
+        true => resumed(&json, &fresh)?,
+        false => fresh,
+    };
+    let size = sweep.size.map(|[width, height]| format!("image.size=[{width}, {height}]"));
+    let overrides: Vec<String> = size.into_iter().chain(sweep.define.iter().cloned()).collect();
+    // What keeps a scene from being loaded, or results from being written, is told before anything is measured.
+    for path in &sweep.scenes {
+        setup.progress.stage(&format!("checking {}", path.display()));
+        setup.interrupt.check()?;
+        scene::load(path, &overrides, &Silent)?;
+    }
+    results.write(&json)?;
+
+    let mut earlier = std::mem::take(&mut results.scenes).into_iter();
+    results.complete = false;
+
+    let mut warnings = Vec::new();
+    let mut pictures = Vec::new();
+    let remaining = Remaining::new(setup.progress.as_ref(), sweep.scenes.len());
+    for path in &sweep.scenes {
+        remaining.next_scene();
+        remaining.stage(&format!("loading {}", path.display()));
+        setup.interrupt.check()?;
+        let loaded = scene::load(path, &overrides, &Silent)?;
+        let subject = Subject {
+            path,
+            scene: &loaded.scene,
+            background: loaded.background,
+            settings: &sweep.settings,
+            runs: sweep.runs as usize,
+            cache: options.cache,
+        };
+        let finished = results.scenes.len();
+        let mut keep = |scene: &SceneResults| {
+            results.scenes.truncate(finished);
+            results.scenes.push(scene.clone());
+            results.write(&json)
+        };
+        let (scene, of_scene) =
+            measure(&subject, earlier.next(), setup, &remaining, &mut warnings, &mut keep)?;
+        results.scenes.truncate(finished);
+        results.scenes.push(scene);
+        pictures.push(of_scene);
+    }
+    results.complete = true;
+
+    results.write(&json)?;
+    let table = csv::table(&results);
+    write_whole(&options.out.join("results.csv"), |file| std::io::Write::write_all(file, table.as_bytes()))?;
+    let page = html::page(&results, &pictures);
+    let report = options.out.join("report.html");
+    write_whole(&report, |file| std::io::Write::write_all(file, page.as_bytes()))?;
+    Ok(Outcome { results, warnings, report })
+}
+
+/// The results in a file, if they are of the same sweep on the same device as `fresh`.
+fn resumed(json: &Path, fresh: &Results) -> Result<Results> {
+    let results = Results::read(json)?;
+    let other = |what: &str| Error::Usage {
+        message: format!("{}: its results are of another {what}", json.display()),
+        help: Some("leave out --resume to measure from the beginning, or write to another folder".to_owned()),
+    };
+    if results.fingerprint != fresh.fingerprint {
+        return Err(other("sweep"));
+    }
+    let device = |results: &Results| {
+        let Environment { device, driver, version, .. } = &results.environment;
+        [device.clone(), driver.clone(), version.clone()]
+    };
+    if device(&results) != device(fresh) {
+        return Err(other("device or version"));
+    }
+    Ok(results)
+}
