@@ -1,6 +1,6 @@
 //! The references' cache: pictures of minutes of work, kept under the [`Fingerprint`] of all that they depend on.
 //!
-//! A file is one line of JSON, a [`Header`], and then the picture: little-endian f32, linear premultiplied RGBA, row by
+//! A file is one line of JSON and then the picture: little-endian f32, linear premultiplied RGBA, row by
 //! row from the top left. Any file of the folder may be deleted at any time.
 
 use std::fs::File;
