@@ -1,17 +1,24 @@
 //! What the device layer refuses, and that it refuses before it asks the driver: nothing here may make the validation
 //! layers speak.
 
-use std::panic::{AssertUnwindSafe, catch_unwind};
+mod common;
 
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Arc;
+
+use glam::DVec3;
 use mesoshell::Error;
 use mesoshell::gpu::{
     Batch, Buffer, DeviceChoice, Draw, Gpu, Messages, Pipeline, PipelineInfo, Target, Texture3d, devices,
     draw, shaders,
 };
+use mesoshell::mesh::generate::{Generator, Sphere};
 use mesoshell::method::shell::ViewConstants;
+use mesoshell::method::{self, Setup};
+use mesoshell::progress::{Interrupt, Progress};
 use mesoshell::volume::{Pyramid, Quantity, Volume};
 
-fn watched(test: impl FnOnce(&std::sync::Arc<Gpu>)) {
+fn watched(test: impl FnOnce(&Arc<Gpu>)) {
     let messages = Messages::default();
     let gpu =
         Gpu::open(&DeviceChoice::Any, Some(&messages)).unwrap_or_else(|error| panic!("{error}\n{error:?}"));
@@ -135,7 +142,9 @@ fn a_draw_whose_parts_do_not_fit_reaches_no_device() {
         let draws = |target: &Target, buffers: &[&Buffer], bytes: usize| {
             let batches = [Batch { pipeline: &pipeline, vertices: 0..0 }];
             let push_constants = &vec![0; bytes];
-            let parts = Draw { target, buffers, textures: &[&volume], push_constants, batches: &batches };
+            let textures = &[&volume];
+            let between = &|_| Ok(());
+            let parts = Draw { target, buffers, textures, push_constants, batches: &batches, between };
             catch_unwind(AssertUnwindSafe(|| draw(&parts).unwrap())).is_ok()
         };
         let (own, foreign) = (buffer(gpu), buffer(&other));
@@ -166,4 +175,35 @@ fn what_the_layers_say_is_heard() {
     };
     let _ = Pipeline::new(&gpu, &target, &info);
     assert!(!messages.all().is_empty());
+}
+
+/// Stops the run as soon as a part of the march is done.
+struct Impatient(Interrupt);
+
+impl Progress for Impatient {
+    fn stage(&self, _: &str) {}
+    fn fraction(&self, done: f64) {
+        assert!(done > 0.0 && done < 1.0, "{done}");
+        self.0.set();
+    }
+}
+
+#[test]
+fn an_interrupt_ends_the_march_between_its_parts() {
+    let messages = Messages::default();
+    let interrupt = Interrupt::default();
+    let progress: Arc<dyn Progress> = Arc::new(Impatient(interrupt.clone()));
+    let setup = Setup {
+        device: &DeviceChoice::Any,
+        validation: Some(&messages),
+        progress: &progress,
+        interrupt: &interrupt,
+    };
+    let view = common::view(DVec3::new(0.0, 0.0, 4.0), DVec3::ZERO, 40.0, 0.01, 64);
+    let mesh = Generator::Sphere(Sphere::default()).build().unwrap();
+    let scene = Arc::new(common::constant_scene(&mesh, 0.2, 0.5, 0.5, view));
+    let mut method = method::by_name("shell").unwrap().prepare(scene, &setup).unwrap();
+    assert!(matches!(method.render(&view), Err(Error::Interrupted)));
+    drop(method);
+    assert_eq!(messages.all(), Vec::<String>::new());
 }

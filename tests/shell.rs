@@ -10,6 +10,8 @@ use std::sync::Arc;
 use glam::{DVec2, DVec3, DVec4};
 use mesoshell::mesh::Mesh;
 use mesoshell::mesh::generate::{Generator, Plane, Sphere, Teapot, Torus, Tube};
+use mesoshell::progress::Silent;
+use mesoshell::scene;
 use mesoshell::shell::{Cell, EXTERIOR, Shell, ShellOptions, Topology};
 use proptest::prelude::*;
 use rand::{RngExt, SeedableRng};
@@ -495,5 +497,14 @@ proptest! {
             let expected = winding_number(&shell, point);
             prop_assert!((expected - found.len() as f64).abs() < 1e-6, "{} and {:?}", expected, found);
         }
+    }
+}
+
+#[test]
+fn the_scenes_to_look_at_first_have_sound_shells() {
+    for name in ["fog-torus", "fur-sphere", "weave-teapot"] {
+        let path = format!("{}/scenes/{name}.toml", env!("CARGO_MANIFEST_DIR"));
+        let health = scene::load(path.as_ref(), &[], &Silent).unwrap().scene.shell.health;
+        assert_eq!((health.inverted, health.zero_volume), (0, 0), "{name}: {health:?}");
     }
 }

@@ -1,7 +1,8 @@
 //! The one call that draws.
 
-use std::ops::Range;
-use std::time::Duration;
+use std::collections::VecDeque;
+use std::ops::{AddAssign, Range};
+use std::time::{Duration, Instant};
 
 use ash::vk;
 
@@ -14,7 +15,7 @@ use super::texture::Texture3d;
 use crate::Result;
 
 /// Draws into a cleared target, one after another: blending keeps their order.
-#[derive(Debug, Clone, Copy)]
+#[derive(Clone, Copy)]
 pub struct Draw<'a> {
     /// Where to.
     pub target: &'a Target,
@@ -26,6 +27,8 @@ pub struct Draw<'a> {
     pub push_constants: &'a [u8],
     /// What is drawn, in order.
     pub batches: &'a [Batch<'a>],
+    /// Hears now and then which part of the vertices is done, 0 to 1; an error ends the drawing.
+    pub between: &'a dyn Fn(f64) -> Result<()>,
 }
 
 /// Some triangles through one pipeline, which was built for a target with the same number of attachments.
@@ -38,7 +41,7 @@ pub struct Batch<'a> {
 }
 
 /// Device time of a draw, by its own timestamps.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct DrawTimes {
     /// Clearing and drawing.
     pub draw: Duration,
@@ -46,11 +49,29 @@ pub struct DrawTimes {
     pub readback: Duration,
 }
 
+impl AddAssign for DrawTimes {
+    fn add_assign(&mut self, other: Self) {
+        self.draw += other.draw;
+        self.readback += other.readback;
+    }
+}
+
+/// How long a submission should take: so soon an interrupt is obeyed, and long before a system gives a device up.
+const PATIENCE: Duration = Duration::from_millis(250);
+/// The first submission has one of so many parts of all vertices.
+const FIRST_PART: u64 = 16;
+/// The next may be larger than the one before it by this factor.
+const MOST_GROWTH: f64 = 8.0;
+
 /// Clears the target to zero, draws, copies the target to host memory and waits for all of it. Device times
 /// are `None` where the device has no timestamps.
 ///
+/// The work is submitted in parts of about a quarter of a second, judged by the part before. Where they end makes no difference
+/// to the picture.
+///
 /// # Errors
-/// [`Error::OutOfMemory`](crate::Error::OutOfMemory) or [`Error::Device`](crate::Error::Device) where the device fails.
+/// [`Error::OutOfMemory`](crate::Error::OutOfMemory) or [`Error::Device`](crate::Error::Device) where the device fails, and
+/// that of [`Draw::between`]. What the target holds on the host is then what it held before.
 ///
 /// # Panics
 /// Where target, bindings or push constants do not match a pipeline, or are another device's.
@@ -66,8 +87,61 @@ pub fn draw(draw: &Draw<'_>) -> Result<Option<DrawTimes>> {
         }
     }
     let timestamps = gpu.timestamp_period.map(|period| Timestamps::new(gpu, period)).transpose()?;
-    let stamp = |commands, stage, index| {
+    let mut rest: VecDeque<Batch<'_>> = draw.batches.iter().cloned().collect();
+    let count =
+        |rest: &VecDeque<Batch<'_>>| -> u64 { rest.iter().map(|batch| batch.vertices.len() as u64).sum() };
+    let all = count(&rest);
+    let mut part = all.div_ceil(FIRST_PART);
+    let mut times = DrawTimes::default();
+    let mut render_pass = target.clearing;
+    loop {
+        let begun = Instant::now();
+        let batches = take(&mut rest, part);
+        submit_part(draw, render_pass, &batches, rest.is_empty(), timestamps.as_ref())?;
         if let Some(timestamps) = &timestamps {
+            times += timestamps.read()?;
+        }
+        if rest.is_empty() {
+            return Ok(timestamps.map(|_| times));
+        }
+        (draw.between)(1.0 - count(&rest) as f64 / all as f64)?;
+        let growth = PATIENCE.as_secs_f64() / begun.elapsed().as_secs_f64();
+        part = (part as f64 * growth.clamp(MOST_GROWTH.recip(), MOST_GROWTH)) as u64;
+        render_pass = target.continuing;
+    }
+}
+
+/// The first batches of `rest`, the last of them cut so that they have about `most` vertices: whole triangles, at least one.
+fn take<'a>(rest: &mut VecDeque<Batch<'a>>, most: u64) -> Vec<Batch<'a>> {
+    let mut taken = Vec::new();
+    let mut left = u32::try_from(most).unwrap_or(u32::MAX).div_ceil(3).max(1) * 3;
+    while left > 0
+        && let Some(batch) = rest.front_mut()
+    {
+        let Range { start, end } = batch.vertices;
+        let middle = start + left.min(end - start);
+        taken.push(Batch { pipeline: batch.pipeline, vertices: start..middle });
+        left -= middle - start;
+        batch.vertices.start = middle;
+        if middle == end {
+            rest.pop_front();
+        }
+    }
+    taken
+}
+
+/// Draws `batches` and, where they are the last, copies the target to host memory.
+fn submit_part(
+    draw: &Draw<'_>,
+    render_pass: vk::RenderPass,
+    batches: &[Batch<'_>],
+    last: bool,
+    timestamps: Option<&Timestamps<'_>>,
+) -> Result<()> {
+    let target = draw.target;
+    let gpu = &target.gpu;
+    let stamp = |commands, stage, index| {
+        if let Some(timestamps) = timestamps {
             timestamps.write(commands, stage, index);
         }
     };
@@ -85,14 +159,14 @@ pub fn draw(draw: &Draw<'_>) -> Result<Option<DrawTimes>> {
         max_depth: 1.0,
     };
     submit(gpu, "drawing", |commands| {
-        if let Some(timestamps) = &timestamps {
+        if let Some(timestamps) = timestamps {
             timestamps.reset(commands);
         }
         stamp(commands, vk::PipelineStageFlags::TOP_OF_PIPE, 0);
         let clears =
             vec![vk::ClearValue { color: vk::ClearColorValue { float32: [0.0; 4] } }; target.images.len()];
         let begin = vk::RenderPassBeginInfo::default()
-            .render_pass(target.render_pass)
+            .render_pass(render_pass)
             .framebuffer(target.framebuffer)
             .render_area(area)
             .clear_values(&clears);
@@ -102,7 +176,7 @@ pub fn draw(draw: &Draw<'_>) -> Result<Option<DrawTimes>> {
             gpu.raw.cmd_begin_render_pass(commands, &begin, vk::SubpassContents::INLINE);
             gpu.raw.cmd_set_viewport(commands, 0, &[viewport]);
             gpu.raw.cmd_set_scissor(commands, 0, &[area]);
-            for Batch { pipeline, vertices } in draw.batches {
+            for Batch { pipeline, vertices } in batches {
                 let raw = &gpu.raw;
                 raw.cmd_bind_pipeline(commands, vk::PipelineBindPoint::GRAPHICS, pipeline.raw);
                 let sets = [pipeline.set];
@@ -115,10 +189,11 @@ pub fn draw(draw: &Draw<'_>) -> Result<Option<DrawTimes>> {
             gpu.raw.cmd_end_render_pass(commands);
         }
         stamp(commands, vk::PipelineStageFlags::COLOR_ATTACHMENT_OUTPUT, 1);
-        copy_to_host(gpu, commands, target);
+        if last {
+            copy_to_host(gpu, commands, target);
+        }
         stamp(commands, vk::PipelineStageFlags::TRANSFER, 2);
-    })?;
-    timestamps.map(|timestamps| timestamps.read()).transpose()
+    })
 }
 
 fn copy_to_host(gpu: &Gpu, commands: vk::CommandBuffer, target: &Target) {

@@ -141,7 +141,7 @@ impl Pipeline {
             .color_blend_state(&blending)
             .dynamic_state(&dynamic)
             .layout(pipeline.layout)
-            .render_pass(target.render_pass);
+            .render_pass(target.clearing);
         // SAFETY: all structures live through the call, and the handles are of this device.
         let created =
             unsafe { gpu.raw.create_graphics_pipelines(vk::PipelineCache::null(), &[create_info], None) };

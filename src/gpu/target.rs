@@ -19,7 +19,10 @@ pub struct Target {
     pub(super) height: u32,
     pub(super) images: Vec<DeviceImage>,
     pub(super) readbacks: Vec<Buffer>,
-    pub(super) render_pass: vk::RenderPass,
+    /// Begins a picture.
+    pub(super) clearing: vk::RenderPass,
+    /// Goes on with one.
+    pub(super) continuing: vk::RenderPass,
     pub(super) framebuffer: vk::Framebuffer,
     pub(super) format: Rgba,
     pub(super) gpu: Arc<Gpu>,
@@ -60,16 +63,18 @@ impl Target {
             height,
             images,
             readbacks,
-            render_pass: vk::RenderPass::null(),
+            clearing: vk::RenderPass::null(),
+            continuing: vk::RenderPass::null(),
             framebuffer: vk::Framebuffer::null(),
             format,
             gpu: gpu.clone(),
             not_shared: PhantomData,
         };
-        target.render_pass = render_pass(gpu, format, attachments)?;
+        target.clearing = render_pass(gpu, format, attachments, true)?;
+        target.continuing = render_pass(gpu, format, attachments, false)?;
         let views: Vec<vk::ImageView> = target.images.iter().map(|image| image.view).collect();
         let framebuffer_info = vk::FramebufferCreateInfo::default()
-            .render_pass(target.render_pass)
+            .render_pass(target.clearing)
             .attachments(&views)
             .width(width)
             .height(height)
@@ -116,17 +121,22 @@ impl Target {
     }
 }
 
-/// Clears to zero, draws, and leaves the images ready to be copied.
-fn render_pass(gpu: &Gpu, format: Rgba, attachments: usize) -> Result<vk::RenderPass> {
+/// Clears to zero or keeps what is there, draws, and leaves the images ready to be copied. Both kinds are compatible in Vulkan's
+/// sense: one framebuffer and one pipeline serve both.
+fn render_pass(gpu: &Gpu, format: Rgba, attachments: usize, clears: bool) -> Result<vk::RenderPass> {
+    let (load, layout) = match clears {
+        true => (vk::AttachmentLoadOp::CLEAR, vk::ImageLayout::UNDEFINED),
+        false => (vk::AttachmentLoadOp::LOAD, vk::ImageLayout::TRANSFER_SRC_OPTIMAL),
+    };
     let descriptions = vec![
         vk::AttachmentDescription::default()
             .format(format.raw())
             .samples(vk::SampleCountFlags::TYPE_1)
-            .load_op(vk::AttachmentLoadOp::CLEAR)
+            .load_op(load)
             .store_op(vk::AttachmentStoreOp::STORE)
             .stencil_load_op(vk::AttachmentLoadOp::DONT_CARE)
             .stencil_store_op(vk::AttachmentStoreOp::DONT_CARE)
-            .initial_layout(vk::ImageLayout::UNDEFINED)
+            .initial_layout(layout)
             .final_layout(vk::ImageLayout::TRANSFER_SRC_OPTIMAL);
         attachments
     ];
@@ -140,11 +150,14 @@ fn render_pass(gpu: &Gpu, format: Rgba, attachments: usize) -> Result<vk::Render
         .pipeline_bind_point(vk::PipelineBindPoint::GRAPHICS)
         .color_attachments(&references);
     let dependencies = [
-        // The clear waits for the copy of the frame before.
+        // The clear waits for the copy of the frame before, what goes on for what was drawn before.
         vk::SubpassDependency::default()
             .src_subpass(vk::SUBPASS_EXTERNAL)
             .dst_subpass(0)
-            .src_stage_mask(vk::PipelineStageFlags::TRANSFER)
+            .src_stage_mask(
+                vk::PipelineStageFlags::TRANSFER | vk::PipelineStageFlags::COLOR_ATTACHMENT_OUTPUT,
+            )
+            .src_access_mask(vk::AccessFlags::COLOR_ATTACHMENT_WRITE)
             .dst_stage_mask(vk::PipelineStageFlags::COLOR_ATTACHMENT_OUTPUT)
             .dst_access_mask(
                 vk::AccessFlags::COLOR_ATTACHMENT_WRITE | vk::AccessFlags::COLOR_ATTACHMENT_READ,
@@ -173,7 +186,8 @@ impl Drop for Target {
         // SAFETY: every submission that used them was waited for; null handles are allowed.
         unsafe {
             self.gpu.raw.destroy_framebuffer(self.framebuffer, None);
-            self.gpu.raw.destroy_render_pass(self.render_pass, None);
+            self.gpu.raw.destroy_render_pass(self.clearing, None);
+            self.gpu.raw.destroy_render_pass(self.continuing, None);
         }
     }
 }

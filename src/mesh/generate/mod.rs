@@ -119,7 +119,7 @@ fn check_count(key: &'static str, value: u32, least: u32, default: u32) -> Check
 
 #[cfg(test)]
 mod tests {
-    use std::collections::HashMap;
+    use std::collections::{HashMap, HashSet};
     use std::f64::consts::PI;
 
     use glam::DVec3;
@@ -240,6 +240,16 @@ mod tests {
             });
             let worst = worst.fold(0.0, f64::max);
             assert!(worst < bound, "{generator:?}: normals differ by {worst}");
+        }
+    }
+
+    #[test]
+    fn no_two_positions_are_equal() {
+        for generator in all() {
+            let mesh = generator.build().unwrap();
+            let distinct: HashSet<_> =
+                mesh.positions.iter().map(|p| p.to_array().map(|x| (x + 0.0).to_bits())).collect();
+            assert_eq!(distinct.len(), mesh.positions.len(), "{generator:?}");
         }
     }
 

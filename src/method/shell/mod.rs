@@ -151,6 +151,10 @@ impl Method for Shell {
             textures: &[&self.volume],
             push_constants: bytemuck::bytes_of(&constants(&self.scene, view, seen.unit)),
             batches: &batches,
+            between: &|done| {
+                self.progress.fraction(done);
+                self.interrupt.check()
+            },
         })?;
         watch.lap("march");
         if let Some(times) = times {
