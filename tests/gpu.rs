@@ -1,8 +1,6 @@
 //! What the device layer refuses, and that it refuses before it asks the driver: nothing here may make the validation
 //! layers speak.
 
-mod common;
-
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 
@@ -199,9 +197,9 @@ fn an_interrupt_ends_the_march_between_its_parts() {
         progress: &progress,
         interrupt: &interrupt,
     };
-    let view = common::view(DVec3::new(0.0, 0.0, 4.0), DVec3::ZERO, 40.0, 0.01, 64);
+    let view = mesoshell::stress::scenes::view(DVec3::new(0.0, 0.0, 4.0), DVec3::ZERO, 40.0, 0.01, 64);
     let mesh = Generator::Sphere(Sphere::default()).build().unwrap();
-    let scene = Arc::new(common::constant_scene(&mesh, 0.2, 0.5, 0.5, view));
+    let scene = Arc::new(mesoshell::stress::scenes::constant_scene(&mesh, 0.2, 0.5, 0.5, view).unwrap());
     let mut method = method::by_name("shell").unwrap().prepare(scene, &setup).unwrap();
     assert!(matches!(method.render(&view), Err(Error::Interrupted)));
     drop(method);
