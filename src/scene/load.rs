@@ -342,7 +342,7 @@ recipe = "fog.toml"
             "'red'",
             "a colour",
         ],
-        ["[mesh]", "[march]\nplan = 'papr'\n[mesh]", "'papr'", "`default` or `paper`"],
+        ["[mesh]", "[march]\nplan = 'papr'\n[mesh]", "'papr'", "`default`, `paper`, `exact`"],
         ["[mesh]", "[march]\nsamples = 0\n[mesh]", "0", "from 1 to 4096"],
         ["[mesh]", "[march]\nstep = 0\n[mesh]", "0", "from 0.001"],
         ["[mesh]", "[camera]\neye = [0, 0, 1]\n[mesh]", "[camera]", "missing key `target`"],
@@ -475,7 +475,7 @@ recipe = "fog.toml"
                 found += 1;
             }
         }
-        assert_eq!(found, 4 + 6 + 5 + 2 + 3);
+        assert_eq!(found, 4 + 7 + 5 + 2 + 3);
         for generator in ["plane", "tube", "sphere", "torus", "vase", "teapot"] {
             let scene = format!("[mesh]\ngenerator = \"{generator}\"\nunknown_key = 1");
             let text = Text::new("keys", scene, &[]).unwrap();
