@@ -3,7 +3,8 @@
 // variant: cycle_depth DEPTH
 // Resolves a cycle of tetrahedra per pixel: no order of them is right for all rays (Kraus and Ertl 2001, who sort the
 // members of such a cycle per pixel). Goes from one entry or exit on the ray to the next, with the members that are active
-// between the two; where several are (the shell overlaps itself) their media add.
+// between the two; where several are (the shell overlaps itself) their media add. A pixel that is too much for that is left to
+// the host: it becomes infinite.
 
 #include "shell.glsl"
 #include "medium.glsl"
@@ -21,6 +22,14 @@ layout(location = 0) out vec4 out_rgba; // premultiplied
 layout(location = 1) out vec4 out_depth; // (distance * alpha, 0, 0, alpha)
 #endif
 
+// Passes through loops after which a pixel is left to the host. lavapipe ends all loops of a pixel after 65,535, and says nothing;
+// and a device that is busy for seconds is taken for hung.
+const uint MOST_PASSES = 60000;
+uint passes = 0;
+// lavapipe runs eight pixels at once, all of them as often as the one that needs it most: what differs among them may count
+// eightfold.
+const uint AT_ONCE = 8;
+
 // The nearest of the members that the ray meets, by entry, and where it meets them.
 const uint MOST_HITS = 64;
 uint hits[MOST_HITS];
@@ -31,6 +40,7 @@ vec2 spans[MOST_HITS];
 uint gather(vec3 ray, float done, out float horizon) {
     uint count = 0;
     horizon = 3.0e38;
+    passes += 2 * (members.y - members.x);
     for (uint member = members.x; member < members.y; member++) {
         uint cell = list[member];
         vec2 span = interval(cells[cell].planes, ray);
@@ -42,10 +52,12 @@ uint gather(vec3 ray, float done, out float horizon) {
             count--;
         }
         uint place = count++;
+        passes += AT_ONCE * (place + 1);
         for (; place > 0 && spans[place - 1].x > span.x; place--) {
             spans[place] = spans[place - 1];
             hits[place] = hits[place - 1];
         }
+        passes -= AT_ONCE * place;
         spans[place] = span;
         hits[place] = cell;
     }
@@ -58,13 +70,14 @@ void main() {
     Gathered gathered = Gathered(vec4(0.0), vec4(0.0));
     float mean_distance = 0.0;
     float z = 0.0;
-    float before;
     float horizon;
+    bool done = false;
     do {
-        before = z;
         uint count = gather(ray, z, horizon);
-        if (count == 0) break;
+        done = count == 0;
+        if (done) break;
         z = max(z, spans[0].x);
+        if (z >= horizon) break; // more overlap here than are kept
         uint first = 0;
         while (z < horizon) {
             while (first < count && spans[first].y <= z) first++;
@@ -80,6 +93,8 @@ void main() {
             for (uint hit = first; hit < end; hit++) {
                 if (spans[hit].y > z) samples = max(samples, sample_count(path_in(cells[hits[hit]].texture, ray), z, next));
             }
+            passes += AT_ONCE * (end - first + 2) * (samples + 3);
+            if (passes > MOST_PASSES) break;
             float step = (next - z) / float(samples); // in a gap there are no samples
             for (uint i = 0; i < samples; i++) {
                 float at = z + (float(i) + 0.5) * step;
@@ -108,10 +123,12 @@ void main() {
             }
             z = next;
         }
-        // Where more than MOST_HITS members overlap in one point there is no getting on; the rest of the ray is left out.
-    } while (horizon < 3.0e38 && z > before);
-    out_rgba = gathered.rgba;
+        done = horizon >= 3.0e38;
+    } while (!done && passes <= MOST_PASSES);
+    const float infinity = uintBitsToFloat(0x7f800000u);
+    bool left = !done || passes > MOST_PASSES;
+    out_rgba = left ? vec4(infinity) : gathered.rgba;
 #ifdef DEPTH
-    out_depth = vec4(mean_distance, 0.0, 0.0, gathered.rgba.a);
+    out_depth = left ? vec4(infinity) : vec4(mean_distance, 0.0, 0.0, gathered.rgba.a);
 #endif
 }

@@ -138,3 +138,39 @@ fn more_members_in_a_pixel_than_are_kept_at_once_are_resolved_in_turns() {
     let view = view(DVec3::new(0.1, 0.2, 6.0), DVec3::ZERO, 24.0, 0.01, 96);
     assert!(agree(&scene(loose(&pile, &texture), &faint, view)) >= 1);
 }
+
+/// A bunch of spikes, each turned from the last, that all hold the origin; their colours differ, so that those that are left
+/// out are missed in hue too.
+fn bunch(count: u32) -> Scene {
+    let spike = |i: u32| {
+        let turn = f64::from(i) * TAU * 0.381_966; // the golden angle
+        let tilt = 0.3 + 0.002 * f64::from(i);
+        let corner = |k: f64| {
+            let (sin, cos) = (turn + k * TAU / 3.0).sin_cos();
+            DVec3::new(cos, sin, -tilt)
+        };
+        [corner(0.0), corner(1.0), corner(2.0), DVec3::new(0.0, 0.0, tilt)]
+    };
+    let spikes: Vec<[DVec3; 4]> = (0..count).map(spike).collect();
+    let faint = PAINTS.map(|(colour, alpha)| (colour, 0.01 * alpha));
+    let view = view(DVec3::new(0.3, 0.2, 6.0), DVec3::ZERO, 24.0, 0.01, 64);
+    Arc::unwrap_or_clone(scene(loose(&spikes, &in_turns(spikes.len())), &faint, view))
+}
+
+#[test]
+fn what_is_too_much_for_the_device_is_left_to_the_host() {
+    for count in [20, 150] {
+        let mut scene = bunch(count);
+        scene.view.depth = count == 150;
+        let scene = Arc::new(scene);
+        let frames =
+            ["shell", "reference"].map(|method| Watched::prepare(method, &scene).render(&scene.view));
+        let metrics = metric::compare(&frames[0].image, &frames[1].image).unwrap();
+        let left = frames[0].report.counts["pixels_left_to_host"];
+        println!("{count} spikes: {left} pixels left, {metrics:?}");
+        assert!(metrics.max <= BOUND, "{metrics:?}");
+        assert_eq!(left > 0, count > 20);
+        let [shell, reference] = frames.map(|frame| frame.depth.unwrap_or_default());
+        assert!(shell.iter().zip(&reference).all(|(a, b)| a == b || (a - b).abs() < 1e-3));
+    }
+}

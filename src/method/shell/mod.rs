@@ -4,8 +4,10 @@
 //! back. Deviations from the paper, and why: entry and exit are computed exactly per pixel within conservative outlines
 //! ([`outline`], `glsl/shell.frag.glsl`), because interpolated ones inherit the rasteriser's snapping; an eye inside the
 //! shell is then no special case; tetrahedra are drawn front to back into a floating-point target; and those that hide one
-//! another in a cycle, or overlap, are resolved per pixel (`glsl/cycle.frag.glsl`).
+//! another in a cycle, or overlap, are resolved per pixel (`glsl/cycle.frag.glsl`), where they are too many on the host
+//! (`left.rs`).
 
+mod left;
 pub mod outline;
 pub mod seen;
 
@@ -162,15 +164,19 @@ impl Method for Shell {
             watch.add("march.readback", times.readback);
         }
         self.interrupt.check()?;
-        let rgba = canvas.target.read(0);
-        let depth = view.depth.then(|| {
+        let mut rgba = canvas.target.read(0);
+        let mut depth: Option<Vec<f32>> = view.depth.then(|| {
             let mean = |[weighted, _, _, alpha]: [f32; 4]| {
                 if alpha > 0.0 { (seen.unit * f64::from(weighted / alpha)) as f32 } else { f32::INFINITY }
             };
             canvas.target.read(1).into_iter().map(mean).collect()
         });
         watch.lap("read");
+        let left =
+            left::fill(&self.scene, view, &mut rgba, depth.as_deref_mut(), &*self.progress, &self.interrupt)?;
+        watch.lap("left");
         let mut report = self.report(&sorted, &seen, &rgba);
+        report.counts.insert("pixels_left_to_host".to_owned(), left);
         report.stages = watch.finish();
         Ok(Frame { image: Image { width: view.width, height: view.height, rgba }, depth, report })
     }

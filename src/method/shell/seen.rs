@@ -35,8 +35,17 @@ pub struct Tile {
 /// The side of a [`Tile`] in pixels: small enough that few members of a large cycle reach into one.
 const TILE: u32 = 16;
 
-/// A cell, and whether more than level 0 can be needed in it; `None` where there is no volume.
-type Found = Option<Result<(Cell, bool), Unseen>>;
+/// A cell as it is seen.
+struct Mapped {
+    cell: Cell,
+    /// The least depth of a vertex, in world units.
+    nearest: f64,
+    /// Whether more than level 0 can be needed in it.
+    minified: bool,
+}
+
+/// `None` where there is no volume.
+type Found = Option<Result<Mapped, Unseen>>;
 
 /// What is drawn together.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -95,13 +104,19 @@ impl Seen {
     }
 
     fn add_sorted(&mut self, found: &[Found]) {
-        let added = self.add(found);
+        let added = self.add(found.iter().flatten());
         if !added.is_empty() {
             self.runs.push(Run::Sorted(added));
         }
     }
 
     fn add_cycle(&mut self, found: &[Found], view: &View) {
+        // No order is right, but members that come about nearest first are sorted quickly in every pixel.
+        let mut found: Vec<_> = found.iter().flatten().collect();
+        found.sort_by(|a, b| {
+            let [a, b] = [a, b].map(|found| found.as_ref().map_or(0.0, |mapped| mapped.nearest));
+            a.total_cmp(&b)
+        });
         let added = self.add(found);
         if added.is_empty() {
             return;
@@ -139,13 +154,13 @@ impl Seen {
     }
 
     /// Keeps those that can be seen, counts the others.
-    fn add(&mut self, found: &[Found]) -> Range<u32> {
+    fn add<'a>(&mut self, found: impl IntoIterator<Item = &'a Result<Mapped, Unseen>>) -> Range<u32> {
         let first = self.cells.len() as u32;
-        for cell in found.iter().flatten() {
-            match cell {
-                Ok((cell, minified)) => {
-                    self.minified |= minified;
-                    self.cells.push(*cell);
+        for found in found {
+            match found {
+                Ok(mapped) => {
+                    self.minified |= mapped.minified;
+                    self.cells.push(mapped.cell);
                 }
                 Err(Unseen::BeforeNear) => self.before_near += 1,
                 Err(Unseen::Beside) => self.beside += 1,
@@ -187,8 +202,7 @@ impl<'a> Eye<'a> {
         }
     }
 
-    /// What the shaders need of tetrahedron `t`, and whether more than level 0 can be needed in it.
-    fn cell(&self, t: usize, exit_faces: u8) -> Result<(Cell, bool), Unseen> {
+    fn cell(&self, t: usize, exit_faces: u8) -> Result<Mapped, Unseen> {
         let shell = &self.scene.shell;
         let vertices = shell.vertices_of(t).map(|vertex| self.view_from_world * (vertex - self.position));
         let outline = self.projection.outline(&vertices, exit_faces)?;
@@ -208,12 +222,14 @@ impl<'a> Eye<'a> {
             (texture_from_view.row(i) * self.unit).as_vec3().extend(texture_at_eye[i] as f32).into()
         });
         let cell = Cell { outline: [[a.x, a.y, b.x, b.y], [c.x, c.y, d.x, d.y]], planes, texture };
-        let farthest = vertices.iter().map(|vertex| vertex.z).fold(f64::NEG_INFINITY, f64::max);
+        let depths = vertices.map(|vertex| vertex.z);
+        let nearest = depths.into_iter().fold(f64::INFINITY, f64::min);
+        let farthest = depths.into_iter().fold(f64::NEG_INFINITY, f64::max);
         // Of all directions, so at least that across the ray.
         let size = self.scene.volume.levels[0].size;
         let texels_per_unit =
             (0..3).map(|i| f64::from(size[i]) * texture_from_view.row(i).length()).fold(0.0, f64::max);
         let footprint = self.scene.medium.lod_footprint * self.projection.pixel * farthest;
-        Ok((cell, footprint * texels_per_unit > 1.0))
+        Ok(Mapped { cell, nearest, minified: footprint * texels_per_unit > 1.0 })
     }
 }

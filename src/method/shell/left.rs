@@ -1,0 +1,45 @@
+//! The pixels that the device leaves to the host: those of cycles so deep that `glsl/cycle.frag.glsl` gives them up. There the
+//! integral is evaluated as the [`reference`](mod@crate::reference) does, whatever the plan of the march.
+
+use rayon::prelude::*;
+
+use crate::Result;
+use crate::progress::{Interrupt, Progress};
+use crate::reference::Reference;
+use crate::scene::{Scene, View};
+
+/// Largest absolute error: that of f32 sums on the device.
+const TOLERANCE: f64 = 1e-6;
+
+/// Fills in the pixels of `rgba`, and of `depth` where it is wanted, that are not finite; returns how many they are.
+///
+/// # Errors
+/// [`Error::Interrupted`](crate::Error::Interrupted) soon after the flag is set.
+pub fn fill(
+    scene: &Scene,
+    view: &View,
+    rgba: &mut [[f32; 4]],
+    mut depth: Option<&mut [f32]>,
+    progress: &dyn Progress,
+    interrupt: &Interrupt,
+) -> Result<u64> {
+    let left: Vec<usize> = (0..rgba.len()).filter(|&pixel| !rgba[pixel][3].is_finite()).collect();
+    if left.is_empty() {
+        return Ok(0);
+    }
+    progress.stage("integrating what the device left");
+    let reference = Reference::new(scene, view).with_tolerance(TOLERANCE);
+    let sample = |&pixel: &usize| {
+        interrupt.check()?;
+        let (x, y) = (pixel % view.width as usize, pixel / view.width as usize);
+        Ok(reference.pixel(x as u32, y as u32))
+    };
+    let samples: Vec<_> = left.par_iter().map(sample).collect::<Result<_>>()?;
+    for (&pixel, sample) in left.iter().zip(samples) {
+        rgba[pixel] = sample.rgba.map(|channel| channel as f32);
+        if let Some(depth) = &mut depth {
+            depth[pixel] = sample.depth as f32;
+        }
+    }
+    Ok(left.len() as u64)
+}
