@@ -159,9 +159,9 @@ fn bunch(count: u32) -> Scene {
 
 #[test]
 fn what_is_too_much_for_the_device_is_left_to_the_host() {
-    for count in [20, 150] {
+    for count in [20, 100] {
         let mut scene = bunch(count);
-        scene.view.depth = count == 150;
+        scene.view.depth = count == 100;
         let scene = Arc::new(scene);
         let frames =
             ["shell", "reference"].map(|method| Watched::prepare(method, &scene).render(&scene.view));
