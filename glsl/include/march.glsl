@@ -3,9 +3,6 @@
 const uint PLAN_DEFAULT = 0; // midpoints, spread by length
 const uint PLAN_PAPER = 1;   // midpoints, as many in every tetrahedron
 const uint PLAN_EXACT = 2;   // Gauss in each voxel
-const uint PLAN_GAUSS = 3;
-const uint PLAN_LINEAR = 4;
-const uint PLAN_PHASE = 5;
 
 // What a ray has gathered, front to back.
 struct Light {
@@ -29,77 +26,6 @@ void march_midpoints(Path path, vec2 segment, float per_depth, uint count, inout
         vec4 texel = fetch(path, z);
         float optical = extinction(texel) * max(step * per_depth, LEAST);
         float alpha = opacity(optical);
-        light.depth += transmittance(light.gathered) * alpha * z;
-        lay_behind(light.gathered, vec4(emitted(texel, alpha), alpha));
-    }
-}
-
-void march_gauss(Path path, vec2 segment, float per_depth, uint count, inout Light light) {
-    float step = (segment.y - segment.x) / float(count);
-    float h = max(step * per_depth, LEAST);
-    for (uint i = 0; i < count; i++) {
-        float from = segment.x + float(i) * step;
-        vec2 z = from + step * vec2(0.21132486540518713, 0.78867513459481287);
-        vec4 a = fetch(path, z.x);
-        vec4 b = fetch(path, z.y);
-        vec2 sigma = vec2(extinction(a), extinction(b)) * h;
-        float whole = 0.5 * (sigma.x + sigma.y);
-        float slope = (sigma.y - sigma.x) * 0.14433756729740643;
-        float alpha = opacity(whole);
-        vec2 amount;
-        if (whole < 3.0e38) {
-            vec2 until = clamp(whole * vec2(0.21132486540518713, 0.78867513459481287) - slope, vec2(0.0), vec2(whole));
-            amount = sigma * exp(-until);
-            float sum = amount.x + amount.y;
-            amount *= sum > LEAST ? alpha / sum : 0.0;
-        } else amount = sigma.x > 3.0e38 ? vec2(1.0, 0.0) : vec2(opacity(0.5 * sigma.x), 1.0 - opacity(0.5 * sigma.x));
-        light.depth += transmittance(light.gathered) * dot(amount, z);
-        lay_behind(light.gathered, vec4(emitted(a, amount.x) + emitted(b, amount.y), alpha));
-    }
-}
-
-// Mean of -ln(1 - alpha) where alpha is linear.
-float mean_extinction(vec4 a, vec4 b) {
-    if (EXTINCTION) return 0.5 * (a.a + b.a);
-    float q0 = 1.0 - a.a, q1 = 1.0 - b.a;
-    float m = 0.5 * (q0 + q1), d = (q1 - q0) / m;
-    if (m <= 0.0) return 3.4e38 * 2.0;
-    float e = d * d;
-    if (e < 0.25) return optical_depth(0.5 * (a.a + b.a)) + e * (1.0 / 24.0 + e * (1.0 / 320.0 + e * (1.0 / 2688.0)));
-    float l0 = q0 > 0.0 ? q0 * log(q0) : 0.0;
-    float l1 = q1 > 0.0 ? q1 * log(q1) : 0.0;
-    return 1.0 - (l1 - l0) / (q1 - q0);
-}
-
-void march_linear(Path path, vec2 segment, float per_depth, uint count, inout Light light) {
-    float step = (segment.y - segment.x) / float(count);
-    float h = max(step * per_depth, LEAST);
-    vec4 a = fetch(path, segment.x);
-    for (uint i = 0; i < count; i++) {
-        float z = segment.x + float(i + 1) * step;
-        vec4 b = fetch(path, i + 1 == count ? segment.y : z);
-        float whole = mean_extinction(a, b) * h;
-        float alpha = opacity(whole);
-        float late = whole < 0.1 ? whole * (0.5 - whole * (1.0 / 3.0 - whole * (0.125 - whole / 30.0))) : whole < 3.0e38 ? alpha / whole - (1.0 - alpha) : 0.0;
-        float early = alpha - late;
-        if (!(a.a > LEAST)) { late += early; early = 0.0; }
-        else if (!(b.a > LEAST)) { early += late; late = 0.0; }
-        light.depth += transmittance(light.gathered) * alpha * (z - 0.5 * step);
-        lay_behind(light.gathered, vec4(emitted(a, early) + emitted(b, late), alpha));
-        a = b;
-    }
-}
-
-void march_phase(Path path, vec2 segment, float per_depth, float ray_length, inout Light light) {
-    float step = view.step * view.texel / ray_length;
-    float h = max(step * per_depth, LEAST);
-    float first = ceil(segment.x / step - 0.5);
-    for (uint i = 0; i < 65536; i++) {
-        float z = (first + float(i) + 0.5) * step;
-        if (z < segment.x) continue;
-        if (!(z < segment.y)) break;
-        vec4 texel = fetch(path, z);
-        float alpha = opacity(extinction(texel) * h);
         light.depth += transmittance(light.gathered) * alpha * z;
         lay_behind(light.gathered, vec4(emitted(texel, alpha), alpha));
     }
@@ -197,8 +123,5 @@ void march_exactly(Path path, vec2 segment, float per_depth, inout Light light) 
 // A wall stops the ray however short the step: `LEAST` keeps infinity times nothing from being no number.
 void march(Path path, vec2 segment, float per_depth, inout Light light) {
     if (PLAN == PLAN_EXACT) march_exactly(path, segment, max(per_depth, LEAST), light);
-    else if (PLAN == PLAN_GAUSS) march_gauss(path, segment, per_depth, sample_count(path, segment.x, segment.y), light);
-    else if (PLAN == PLAN_LINEAR) march_linear(path, segment, per_depth, sample_count(path, segment.x, segment.y), light);
-    else if (PLAN == PLAN_PHASE) march_phase(path, segment, per_depth, per_depth / view.per_opacity_distance, light);
     else march_midpoints(path, segment, per_depth, sample_count(path, segment.x, segment.y), light);
 }

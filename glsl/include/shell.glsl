@@ -12,7 +12,6 @@ layout(push_constant, std430) uniform View {
     float per_opacity_distance; // 1 / opacity_distance
     float step;          // `default` plan: texels a sample
     uint samples;        // `paper` plan: samples a tetrahedron
-    float texel;
 } view;
 
 // A tetrahedron as seen from the eye.

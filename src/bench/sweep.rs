@@ -87,16 +87,13 @@ impl Setting {
             March::Default { .. } => "default",
             March::Paper { .. } => "paper",
             March::Exact => "exact",
-            March::Gauss { .. } => "gauss",
-            March::Linear { .. } => "linear",
-            March::Phase { .. } => "phase",
         }
     }
 
     /// The level within the plan, for people: `"step 0.5"`.
     pub fn level(&self) -> String {
         match self.march {
-            March::Default { step } | March::Gauss { step } | March::Linear { step } | March::Phase { step } => format!("step {step}"),
+            March::Default { step } => format!("step {step}"),
             March::Paper { samples: 1 } => "1 sample".to_owned(),
             March::Paper { samples } => format!("{samples} samples"),
             March::Exact => "exact".to_owned(),
@@ -115,7 +112,7 @@ impl Setting {
     /// with a power of it. It is 1 for a plan without levels.
     pub fn spacing(&self) -> f64 {
         match self.march {
-            March::Default { step } | March::Gauss { step } | March::Linear { step } | March::Phase { step } => step,
+            March::Default { step } => step,
             March::Paper { samples } => 1.0 / f64::from(samples),
             March::Exact => 1.0,
         }
@@ -151,12 +148,6 @@ struct Plans {
     paper: Vec<Samples>,
     #[serde(default)]
     exact: bool,
-    #[serde(default)]
-    gauss: Vec<Step>,
-    #[serde(default)]
-    linear: Vec<Step>,
-    #[serde(default)]
-    phase: Vec<Step>,
 }
 
 fn five_runs() -> Runs {
@@ -227,15 +218,7 @@ impl Sweep {
             scenes: file.scenes.get_ref().iter().map(|scene| base_dir.join(scene)).collect(),
             define: file.define,
             size: file.size.map(|size| size.0.map(|side| side.0)),
-            settings: {
-                let mut all = settings(&methods, &levels);
-                let p = file.plans.get_ref();
-                let mut add = |march| all.push(Setting { method: "shell".into(), march });
-                p.gauss.iter().for_each(|s| add(March::Gauss { step: s.0 }));
-                p.linear.iter().for_each(|s| add(March::Linear { step: s.0 }));
-                p.phase.iter().for_each(|s| add(March::Phase { step: s.0 }));
-                all
-            },
+            settings: settings(&methods, &levels),
             runs: file.runs.0,
         })
     }

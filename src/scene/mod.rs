@@ -88,18 +88,6 @@ pub enum March {
     /// Cell by cell of texel centres, where the texture is a cubic along the ray, by three-point Gauss-Legendre.
     /// Optical depth is exact where the texture holds extinction.
     Exact,
-    /// x
-    Gauss {
-        /// x
-        step: f64 },
-    /// x
-    Linear {
-        /// x
-        step: f64 },
-    /// x
-    Phase {
-        /// x
-        step: f64 },
 }
 
 impl Default for March {

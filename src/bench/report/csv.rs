@@ -39,7 +39,7 @@ pub fn table(results: &Results) -> String {
     let mut lines = vec![header];
     for (scene, point) in points() {
         let (step, samples) = match point.setting.march {
-            March::Default { step } | March::Gauss { step } | March::Linear { step } | March::Phase { step } => (step.to_string(), String::new()),
+            March::Default { step } => (step.to_string(), String::new()),
             March::Paper { samples } => (String::new(), samples.to_string()),
             March::Exact => (String::new(), String::new()),
         };

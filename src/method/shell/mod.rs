@@ -39,7 +39,6 @@ pub struct ViewConstants {
     pub per_opacity_distance: f32,
     pub step: f32,
     pub samples: u32,
-    pub texel: f32,
 }
 
 /// A scene on a device.
@@ -276,9 +275,6 @@ fn plan(march: March) -> u32 {
         March::Default { .. } => 0,
         March::Paper { .. } => 1,
         March::Exact => 2,
-        March::Gauss { .. } => 3,
-        March::Linear { .. } => 4,
-        March::Phase { .. } => 5,
     }
 }
 
@@ -287,7 +283,7 @@ fn constants(scene: &Scene, view: &View, unit: f64) -> ViewConstants {
     let pixel = view.pixel_at_unit_depth();
     let (step, samples) = match scene.march {
         March::Paper { samples } => (1.0, samples),
-        March::Default { step } | March::Gauss { step } | March::Linear { step } | March::Phase { step } => (step, 1),
+        March::Default { step } => (step, 1),
         // Of cycles alone, which are always marched by midpoints.
         March::Exact => (CYCLE_STEP, 1),
     };
@@ -301,16 +297,5 @@ fn constants(scene: &Scene, view: &View, unit: f64) -> ViewConstants {
         per_opacity_distance: (unit / scene.medium.opacity_distance) as f32,
         step: step as f32,
         samples,
-        texel: (texel(scene) / unit) as f32,
     }
-}
-
-fn texel(scene: &Scene) -> f64 {
-    let size = scene.volume.levels[0].size;
-    let mut all: Vec<f64> = scene.shell.cells.iter().map(|cell| {
-        let m = cell.texture_from_world;
-        1.0 / (0..3).map(|i| f64::from(size[i]) * m.row(i).length()).fold(0.0, f64::max)
-    }).collect();
-    all.sort_by(f64::total_cmp);
-    all[all.len() / 2]
 }
