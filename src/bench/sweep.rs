@@ -100,14 +100,6 @@ impl Setting {
         }
     }
 
-    /// Plan and level, for people: `"default plan, step 0.5"`.
-    pub fn quality(&self) -> String {
-        match self.march {
-            March::Exact => "exact plan".to_owned(),
-            _ => format!("{} plan, {}", self.plan(), self.level()),
-        }
-    }
-
     /// The distance between samples in the plan's own unit, a texel or a ray's part in a tetrahedron: the error falls
     /// with a power of it. It is 1 for a plan without levels.
     pub fn spacing(&self) -> f64 {

@@ -2,6 +2,7 @@
 //!
 //! Standard output carries the result alone, standard error progress, warnings and errors.
 
+mod accuracy;
 mod bench;
 mod devices;
 mod diff;
@@ -20,7 +21,8 @@ use clap::{Args, Parser, Subcommand};
 const EXIT_CODES: &str = "\
 Exit codes:
   0    done
-  1    diff: the images differ by more than --threshold; stress: a case fails
+  1    diff: the images differ by more than --threshold; stress: a case fails;
+       render --verify: the error is above --max-error
   2    the request makes no sense (an unknown option, a bad -D)
   3    an input file is missing, damaged or means something impossible
   4    no usable Vulkan device
@@ -75,7 +77,7 @@ pub fn run() -> ExitCode {
 
     let Cli { talk, command } = Cli::parse();
     let done = match command {
-        Command::Render(arguments) => render::run(arguments, talk).map(|()| ExitCode::SUCCESS),
+        Command::Render(arguments) => render::run(arguments, talk),
         Command::Devices(arguments) => devices::run(arguments, talk).map(|()| ExitCode::SUCCESS),
         Command::Mesh(command) => mesh::run(command, talk).map(|()| ExitCode::SUCCESS),
         Command::Volume(command) => volume::run(command, talk).map(|()| ExitCode::SUCCESS),

@@ -1,6 +1,7 @@
 //! `mesoshell render`: from a scene file to a picture.
 
 use std::path::PathBuf;
+use std::process::ExitCode;
 use std::sync::Arc;
 
 use clap::Args;
@@ -14,6 +15,7 @@ use mesoshell::value::PictureSize;
 use mesoshell::{Error, Result};
 use serde::Serialize;
 
+use super::accuracy::{self, Accuracy};
 use super::progress::{Line, listen};
 use super::{Talk, table};
 
@@ -35,6 +37,8 @@ pub struct Arguments {
     /// Set a key of the scene: -D shell.thickness=0.2; may be given more than once
     #[arg(short = 'D', value_name = "KEY=VALUE")]
     define: Vec<String>,
+    #[command(flatten)]
+    accuracy: accuracy::Arguments,
     /// The device: its number in `mesoshell devices`, a part of its name, or its UUID
     #[arg(long)]
     device: Option<DeviceChoice>,
@@ -50,13 +54,18 @@ struct Rendered {
     output: PathBuf,
     width: u32,
     height: u32,
+    /// With `--max-error`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    accuracy: Option<Accuracy>,
     /// Its stages are those of the load, of the method's preparation, of the frame, and of writing.
     report: Report,
 }
 
+/// Exit code 1 where the picture's error was verified, and is too large.
+///
 /// # Errors
 /// Whatever stands between the scene and its picture.
-pub fn run(arguments: Arguments, talk: Talk) -> Result<()> {
+pub fn run(arguments: Arguments, talk: Talk) -> Result<ExitCode> {
     let interrupt = Interrupt::default();
     listen(&interrupt);
     let progress: Arc<dyn Progress> = Arc::new(Line::new(talk));
@@ -67,11 +76,15 @@ pub fn run(arguments: Arguments, talk: Talk) -> Result<()> {
         talk.warn(warning);
     }
     talk.result(&rendered, || {
-        let Rendered { output, width, height, report, .. } = &rendered;
+        let Rendered { output, width, height, accuracy, report, .. } = &rendered;
         let time = |stage: &Stage| format!("{:9.2} ms", stage.milliseconds);
         let stages = table(report.stages.iter().map(|stage| (stage.name.as_str(), time(stage))));
-        format!("{}\n{} on {}, {width}x{height}\n{stages}", output.display(), report.method, report.device)
-    })
+        let accuracy = accuracy.as_ref().map_or_else(String::new, Accuracy::told);
+        let (method, device) = (&report.method, &report.device);
+        format!("{}\n{method} on {device}, {width}x{height}\n{accuracy}{stages}", output.display())
+    })?;
+    let is_kept = rendered.accuracy.as_ref().is_none_or(Accuracy::is_kept);
+    Ok(if is_kept { ExitCode::SUCCESS } else { ExitCode::from(1) })
 }
 
 fn render(arguments: &Arguments, progress: &Arc<dyn Progress>, interrupt: &Interrupt) -> Result<Rendered> {
@@ -82,13 +95,14 @@ fn render(arguments: &Arguments, progress: &Arc<dyn Progress>, interrupt: &Inter
         name.into()
     });
     file::check_writable(&output)?;
+    arguments.accuracy.check(&arguments.method, &arguments.define)?;
 
     let device = arguments.device.clone().unwrap_or_default();
     let messages = arguments.validate.then(Messages::default);
     let setup = Setup { device: &device, validation: messages.as_ref(), progress, interrupt };
     let mut watch = Stopwatch::start();
-    let method = method::by_name(&arguments.method).expect("clap lets through the names of the table alone");
-    let method = (method.open)(&setup)?;
+    let entry = method::by_name(&arguments.method).expect("clap lets through the names of the table alone");
+    let method = (entry.open)(&setup)?;
     watch.lap("open");
     let mut stages = watch.finish();
 
@@ -102,13 +116,19 @@ fn render(arguments: &Arguments, progress: &Arc<dyn Progress>, interrupt: &Inter
     interrupt.check()?;
 
     let mut watch = Stopwatch::start();
-    let mut method = method.prepare(Arc::new(loaded))?;
+    let choice = arguments.accuracy.choose(&loaded, entry, &setup)?;
+    if let Some(choice) = &choice {
+        loaded.march = choice.march();
+        watch.lap("pilot");
+    }
+    let loaded = Arc::new(loaded);
+    let mut method = method.prepare(loaded.clone())?;
     watch.lap("prepare");
     stages.extend(watch.finish());
 
     let mut frame = method.render(&view)?;
     drop(method);
-    let messages = messages.map_or_else(Vec::new, |messages| messages.all());
+    let messages = messages.as_ref().map_or_else(Vec::new, Messages::all);
     if !messages.is_empty() {
         return Err(Error::Device {
             message: format!("the validation layers object:\n{}", messages.join("\n")),
@@ -116,15 +136,19 @@ fn render(arguments: &Arguments, progress: &Arc<dyn Progress>, interrupt: &Inter
         });
     }
 
-    progress.stage("writing the picture");
     let mut watch = Stopwatch::start();
+    let accuracy = choice.map(|choice| choice.accuracy(&loaded, &frame.image, &setup)).transpose()?;
+    if accuracy.as_ref().is_some_and(|accuracy| accuracy.verified.is_some()) {
+        watch.lap("verify");
+    }
+    progress.stage("writing the picture");
     file::write(&output, &frame.image, background)?;
     watch.lap("write");
     stages.append(&mut frame.report.stages);
     stages.extend(watch.finish());
     frame.report.stages = stages;
     let View { width, height, .. } = view;
-    Ok(Rendered { scene: scene.clone(), output, width, height, report: frame.report })
+    Ok(Rendered { scene: scene.clone(), output, width, height, accuracy, report: frame.report })
 }
 
 fn methods() -> PossibleValuesParser {

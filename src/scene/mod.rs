@@ -25,6 +25,8 @@ pub(crate) mod text;
 pub use camera::{Camera, View};
 pub use load::{Loaded, load, load_if, parse};
 
+use std::fmt;
+
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
@@ -88,6 +90,18 @@ pub enum March {
     /// Cell by cell of texel centres, where the texture is a cubic along the ray, by three-point Gauss-Legendre.
     /// Optical depth is exact where the texture holds extinction.
     Exact,
+}
+
+impl fmt::Display for March {
+    /// For people: `"default plan, step 0.5"`.
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Default { step } => write!(formatter, "default plan, step {step}"),
+            Self::Paper { samples: 1 } => write!(formatter, "paper plan, 1 sample"),
+            Self::Paper { samples } => write!(formatter, "paper plan, {samples} samples"),
+            Self::Exact => write!(formatter, "exact plan"),
+        }
+    }
 }
 
 impl Default for March {

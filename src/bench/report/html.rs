@@ -153,7 +153,7 @@ fn gallery(page: &mut String, scene: &SceneResults, pictures: &Pictures) {
         .zip(["most accurate", "least accurate"])
     {
         let point = &scene.points[index];
-        let quality = point.setting.quality();
+        let quality = point.setting.march;
         let image = thumbnail(image);
         shown(page, &image, pictures.background, &format!("{title}: {quality}"));
         *page += "</figure>\n";
@@ -182,7 +182,7 @@ fn stages(page: &mut String, scene: &SceneResults) {
     *page += "</tr></thead>\n<tbody>\n";
     for point in &scene.points {
         let setting = &point.setting;
-        let _ = write!(page, "<tr><th scope=\"row\">{}, {}</th>", escape(&setting.method), setting.quality());
+        let _ = write!(page, "<tr><th scope=\"row\">{}, {}</th>", escape(&setting.method), setting.march);
         for name in &names {
             let stage = point.stages.iter().find(|stage| stage.name == *name);
             let _ = match stage {

@@ -1,0 +1,112 @@
+//! The pilot: from the error that a user accepts to the coarsest march that meets it.
+//!
+//! [`choose`] renders the view at one march after another and compares each picture with the f64 reference at a random
+//! [`Sample`] of its pixels, until [`search`] has found the march. What the trials showed is kept under the fingerprint of all
+//! that it depends on, so that the same view is not measured twice.
+
+mod sample;
+pub mod search;
+mod trials;
+
+use std::path::Path;
+use std::sync::Arc;
+
+pub use sample::{Estimate, Sample};
+use search::Next;
+use serde::{Deserialize, Serialize};
+use trials::Trials;
+
+use super::fingerprint::Fingerprint;
+use crate::gpu::{Gpu, shaders};
+use crate::method::{Entry, Setup};
+use crate::progress::{Progress, Silent};
+use crate::reference::Reference;
+use crate::scene::{March, Scene};
+use crate::{Error, Result};
+
+/// A march, and how far from the reference it was found to be.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Trial {
+    /// What was tried.
+    pub march: March,
+    /// Its error.
+    pub error: Estimate,
+}
+
+/// What was chosen.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Choice {
+    /// The coarsest march that meets the error, and its own.
+    pub trial: Trial,
+    /// How many marches were measured for it now; the others were known.
+    pub measured: usize,
+}
+
+/// The coarsest march by which `method` renders the scene's own view with an RMSE (linear premultiplied RGBA, all pixels) of at
+/// most `max_error`; `scene.march` is not read. Known trials are taken from `cache`, a folder, and kept there.
+///
+/// # Errors
+/// [`Error::Usage`] where no march meets the error; as [`Method::render`](crate::method::Method::render); [`Error::Output`]
+/// where trials cannot be kept.
+pub fn choose(
+    scene: &Scene,
+    max_error: f64,
+    method: &Entry,
+    cache: Option<&Path>,
+    setup: &Setup<'_>,
+) -> Result<Choice> {
+    let mut trials = Trials::load(cache, fingerprint(scene, method, setup)?);
+    let mut sample: Option<Sample> = None;
+    let mut measured = 0;
+    loop {
+        match search::next(trials.all(), max_error) {
+            Next::Done(trial) => return Ok(Choice { trial, measured }),
+            Next::Impossible(best) => {
+                return Err(Error::Usage {
+                    message: format!(
+                        "no march meets an error of {max_error:e}: the best, {}, has one of {:.1e}",
+                        best.march, best.error.rmse
+                    ),
+                    help: Some(format!("accept {:.1e} or more", best.error.upper())),
+                });
+            }
+            Next::Try(march) => {
+                setup.interrupt.check()?;
+                let sample = match &mut sample {
+                    Some(sample) => sample,
+                    none => {
+                        setup.progress.stage("pilot: integrating some pixels");
+                        let reference = Reference::new(scene, &scene.view);
+                        none.insert(Sample::draw(
+                            &reference,
+                            &scene.view,
+                            setup.progress.as_ref(),
+                            setup.interrupt,
+                        )?)
+                    }
+                };
+                setup.progress.stage(&format!("pilot: trying {march}"));
+                let silent: Arc<dyn Progress> = Arc::new(Silent);
+                let tried = Arc::new(Scene { march, ..scene.clone() });
+                let mut method = method.prepare(tried, &Setup { progress: &silent, ..*setup })?;
+                let frame = method.render(&scene.view)?;
+                trials.add(Trial { march, error: sample.estimate(&frame.image) })?;
+                measured += 1;
+            }
+        }
+    }
+}
+
+/// Of all that a trial's error depends on but the march: the picture, the method, its shaders and the device.
+fn fingerprint(scene: &Scene, method: &Entry, setup: &Setup<'_>) -> Result<Fingerprint> {
+    let device = Gpu::open(setup.device, setup.validation)?.info().clone();
+    let of_reference = Fingerprint::of_reference(scene, &scene.view).to_string();
+    let mut builder = Fingerprint::builder("pilot");
+    for text in [&of_reference, method.name, &device.name, &device.driver] {
+        builder = builder.bytes(text.as_bytes());
+    }
+    for shader in [shaders::SHELL_FRAG, shaders::CYCLE_FRAG] {
+        builder = builder.numbers(shader.words());
+    }
+    Ok(builder.finish())
+}
