@@ -5,7 +5,6 @@
 
 mod exr_header;
 
-use std::fs::File;
 use std::io::{BufReader, BufWriter, Write};
 use std::path::Path;
 
@@ -15,7 +14,7 @@ use image::{DynamicImage, ExtendedColorType, ImageDecoder, ImageEncoder, ImageEr
 
 use super::Image;
 use super::srgb::{linear_from_srgb, srgb_from_linear};
-use crate::{Error, Result, output};
+use crate::{Error, Result, input, output};
 
 /// The most pixels that are read: 4 GiB of f32 RGBA.
 const MOST_PIXELS: u64 = 1 << 28;
@@ -93,13 +92,9 @@ pub fn write(path: impl AsRef<Path>, image: &Image, background: Option<[f32; 3]>
 pub fn read(path: impl AsRef<Path>) -> Result<Image> {
     let path = path.as_ref();
     let format = Format::of(path)?;
-    let open = || -> std::io::Result<(BufReader<File>, u64)> {
-        let file = File::open(path)?;
-        let length = file.metadata()?.len();
-        Ok((BufReader::new(file), length))
-    };
-    let (mut file, length) =
-        open().map_err(|error| Error::input(path, format!("cannot be read: {error}")))?;
+    let (file, length) =
+        input::open(path).map_err(|error| Error::input(path, format!("cannot be read: {error}")))?;
+    let mut file = BufReader::new(file);
     let damaged = |error: ImageError| {
         Error::input(path, format!("cannot be decoded: {error}"))
             .with_help("is it complete, and what its extension says?")

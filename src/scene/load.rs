@@ -1,6 +1,5 @@
 //! From the text of a scene file to the [`Scene`] that it describes.
 
-use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use glam::{DVec2, DVec3};
@@ -19,10 +18,7 @@ use crate::shell::{Shell, ShellOptions};
 use crate::value::{Exactly, Finite};
 use crate::volume::recipe::{self, Recipe};
 use crate::volume::{self, Interpretation, Pyramid, Volume};
-use crate::{Error, Result};
-
-/// No scene file that a person wrote is longer, in bytes.
-const LONGEST_SCENE_FILE: u64 = 1 << 20;
+use crate::{Error, Result, input};
 
 /// A scene, with what its file says beyond it.
 #[derive(Debug, Clone)]
@@ -59,12 +55,7 @@ pub fn load_if(
         Error::input(path, format!("the scene file cannot be read: {error}"))
             .with_help("check the path, or write the scene that docs/scene.md describes")
     };
-    let mut text = String::new();
-    let file = std::fs::File::open(path).map_err(unreadable)?;
-    file.take(LONGEST_SCENE_FILE + 1).read_to_string(&mut text).map_err(unreadable)?;
-    if text.len() as u64 > LONGEST_SCENE_FILE {
-        return Err(Error::input(path, "longer than 1 MiB: this is no scene file"));
-    }
+    let text = input::text(path).map_err(unreadable)?;
     let text = Text::new(&path.display().to_string(), text, overrides)?;
     build(&text, path.parent().unwrap_or(Path::new("")), progress, admit)
 }

@@ -5,13 +5,12 @@
 
 use std::cmp::Ordering;
 use std::ffi::OsStr;
-use std::fs::File;
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
 use image::{ColorType, DynamicImage, ImageDecoder, ImageFormat, ImageReader};
 
-use super::raw::{check_fits_memory, claimed_size, unreadable};
+use super::raw::{check_fits_memory, claimed_size, open, unreadable};
 use super::{AlphaMode, MAX_DEFLATE_RATIO, RawVolume};
 use crate::frame::srgb::linear_from_srgb;
 use crate::{Error, Result};
@@ -70,8 +69,7 @@ fn undecodable(path: &Path, error: &image::ImageError) -> Error {
 
 /// A decoder that has read the header of the PNG at `path` and found its size plausible.
 fn decoder(path: &Path) -> Result<impl ImageDecoder> {
-    let file = File::open(path).map_err(|error| unreadable(path, &error))?;
-    let length = file.metadata().map_err(|error| unreadable(path, &error))?.len();
+    let (file, length) = open(path)?;
     let decoder = ImageReader::with_format(BufReader::new(file), ImageFormat::Png)
         .into_decoder()
         .map_err(|error| undecodable(path, &error))?;
