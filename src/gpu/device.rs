@@ -98,7 +98,11 @@ pub fn devices() -> Result<Vec<DeviceInfo>> {
 /// `error` as one of ours: out of memory or a device fault, while doing `what`.
 pub(super) fn vulkan_error(what: &str, error: vk::Result) -> Error {
     match error {
-        vk::Result::ERROR_OUT_OF_HOST_MEMORY | vk::Result::ERROR_OUT_OF_DEVICE_MEMORY => Error::OutOfMemory {
+        // Pools here are as large as what is made from them: where one runs out, memory did.
+        vk::Result::ERROR_OUT_OF_HOST_MEMORY
+        | vk::Result::ERROR_OUT_OF_DEVICE_MEMORY
+        | vk::Result::ERROR_OUT_OF_POOL_MEMORY
+        | vk::Result::ERROR_FRAGMENTED_POOL => Error::OutOfMemory {
             message: format!("the device ran out of memory while {what}"),
             help: Some("use a smaller picture, volume or mesh".into()),
         },
@@ -513,4 +517,23 @@ fn choose(
             help: Some(format!("there is: {}", names.join(", "))),
         }
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn want_of_memory_is_told_from_other_failures() {
+        let exit_code = |error| vulkan_error("drawing", error).exit_code();
+        for error in [
+            vk::Result::ERROR_OUT_OF_HOST_MEMORY,
+            vk::Result::ERROR_OUT_OF_DEVICE_MEMORY,
+            vk::Result::ERROR_OUT_OF_POOL_MEMORY,
+            vk::Result::ERROR_FRAGMENTED_POOL,
+        ] {
+            assert_eq!(exit_code(error), 5, "{error:?}");
+        }
+        assert_eq!(exit_code(vk::Result::ERROR_DEVICE_LOST), 4);
+    }
 }
