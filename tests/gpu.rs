@@ -30,6 +30,18 @@ fn empty(size: [u32; 3]) -> Pyramid {
     Pyramid { levels: vec![Volume { size, texels: vec![[0.0; 4]; texels], quantity: Quantity::Opacity }] }
 }
 
+/// The pipeline of the sorted tetrahedra.
+fn shell_pipeline(push_constant_bytes: u32) -> PipelineInfo<'static> {
+    PipelineInfo {
+        vertex: shaders::SHELL_VERT,
+        fragment: shaders::SHELL_FRAG,
+        constants: &[],
+        storage_buffers: 3,
+        textures: 1,
+        push_constant_bytes,
+    }
+}
+
 #[test]
 fn a_device_is_chosen_by_index_name_and_uuid() {
     let all = devices().expect("a Vulkan driver");
@@ -126,15 +138,8 @@ fn a_draw_whose_parts_do_not_fit_reaches_no_device() {
     watched(|gpu| {
         let other = Gpu::open(&DeviceChoice::Any, None).unwrap();
         let target = |gpu, attachments| Target::new(gpu, 4, 4, attachments).unwrap();
-        let info = PipelineInfo {
-            vertex: shaders::SHELL_VERT,
-            fragment: shaders::SHELL_FRAG,
-            constants: &[],
-            storage_buffers: 3,
-            textures: 1,
-            push_constant_bytes: size_of::<ViewConstants>() as u32,
-        };
-        let pipeline = Pipeline::new(gpu, &target(gpu, 1), &info).unwrap();
+        let bytes = size_of::<ViewConstants>();
+        let pipeline = Pipeline::new(gpu, &target(gpu, 1), &shell_pipeline(bytes as u32)).unwrap();
         let buffer = |gpu| Buffer::storage(gpu, "nothing", &[0u32; 64]).unwrap();
         let volume = Texture3d::upload(gpu, "the volume", &empty([1, 1, 1])).unwrap();
         let draws = |target: &Target, buffers: &[&Buffer], bytes: usize| {
@@ -146,7 +151,6 @@ fn a_draw_whose_parts_do_not_fit_reaches_no_device() {
             catch_unwind(AssertUnwindSafe(|| draw(&parts).unwrap())).is_ok()
         };
         let (own, foreign) = (buffer(gpu), buffer(&other));
-        let bytes = size_of::<ViewConstants>();
         assert!(draws(&target(gpu, 1), &[&own; 3], bytes));
         assert!(!draws(&target(gpu, 2), &[&own; 3], bytes), "another number of attachments");
         assert!(!draws(&target(gpu, 1), &[&own; 2], bytes), "a buffer is missing");
@@ -163,15 +167,7 @@ fn what_the_layers_say_is_heard() {
     let messages = Messages::default();
     let gpu = Gpu::open(&DeviceChoice::Any, Some(&messages)).unwrap();
     let target = Target::new(&gpu, 4, 4, 1).unwrap();
-    let info = PipelineInfo {
-        vertex: shaders::SHELL_VERT,
-        fragment: shaders::SHELL_FRAG,
-        constants: &[],
-        storage_buffers: 3,
-        textures: 1,
-        push_constant_bytes: 4,
-    };
-    let _ = Pipeline::new(&gpu, &target, &info);
+    let _ = Pipeline::new(&gpu, &target, &shell_pipeline(4));
     assert!(!messages.all().is_empty());
 }
 

@@ -301,7 +301,7 @@ recipe = "fog.toml"
     }
 
     /// What is replaced in [`SCENE`] by what, the spot that must be underlined, a part of the message.
-    const MISTAKES: &[[&str; 4]] = &[
+    const CHANGES: &[[&str; 4]] = &[
         ["segments", "segmens", "segmens", "unknown key `segmens`"],
         ["\"torus\"", "\"tours\"", "\"tours\"", "unknown name `tours`"],
         ["= 8", "= 2", "2", "`segments` is 2"],
@@ -321,53 +321,43 @@ recipe = "fog.toml"
         ["recipe =", "opacity_distance = 0\nrecipe =", "0", "greater than 0"],
         ["recipe =", "lod_footprint = -0.1\nrecipe =", "-0.1", "at least 0"],
         ["[volume]", "[volume", "", "unclosed table"],
-        ["[mesh]", "[image]\nsize = [0, 9]\n[mesh]", "0", "from 1 to 32768"],
-        ["[mesh]", "[image]\nsize = [9, 32769]\n[mesh]", "32769", "from 1 to 32768"],
-        ["[mesh]", "[image]\nsize = [32768, 32768]\n[mesh]", "[32768, 32768]", "2^28 pixels"],
-        ["[mesh]", "[image]\nbackground = [0, -1, 0]\n[mesh]", "-1", "at least 0"],
-        ["[mesh]", "[image]\nbackground = '#12345'\n[mesh]", "'#12345'", "a colour such as"],
-        ["[mesh]", "[image]\nbackground = [0, 1, 0, 1]\n[mesh]", "[0, 1, 0, 1]", "a list of 3"],
         [
             "\"fog.toml\"",
             "\"fog.toml\"\ntransfer.points = [{ value = 0, colour = 'red', alpha = 1 }]",
             "'red'",
             "a colour",
         ],
-        ["[mesh]", "[march]\nplan = 'papr'\n[mesh]", "'papr'", "`default`, `paper`, `exact`"],
-        ["[mesh]", "[march]\nsamples = 0\n[mesh]", "0", "from 1 to 4096"],
-        ["[mesh]", "[march]\nstep = 0\n[mesh]", "0", "from 0.001"],
-        ["[mesh]", "[camera]\neye = [0, 0, 1]\n[mesh]", "[camera]", "missing key `target`"],
-        [
-            "[mesh]",
-            "[camera]\neye = [1, 2, 3]\ntarget = [1, 2, 3.0]\n[mesh]",
-            "[1, 2, 3.0]",
-            "other than the eye",
-        ],
-        ["[mesh]", "[camera]\neye = [0, 2, 1]\ntarget = [0, 1, 1]\n[mesh]", "[0, 1, 1]", "line of sight"],
-        [
-            "[mesh]",
-            "[camera]\neye = [0, 0, 1]\ntarget = [0, 0, 0]\nup = [0, 0, 9]\n[mesh]",
-            "[0, 0, 9]",
-            "line of sight",
-        ],
-        [
-            "[mesh]",
-            "[camera]\neye = [0, 0, 1]\ntarget = [0, 0, 0]\nfov = 180\n[mesh]",
-            "180",
-            "between 0 and 180",
-        ],
-        ["[mesh]", "[camera]\neye = [0, 0, 1]\ntarget = [0, 0, 0]\nnear = 0\n[mesh]", "0", "greater than 0"],
+    ];
+
+    /// What is laid before [`SCENE`], the spot that must be underlined, a part of the message.
+    const ADDITIONS: &[[&str; 3]] = &[
+        ["[image]\nsize = [0, 9]", "0", "from 1 to 32768"],
+        ["[image]\nsize = [9, 32769]", "32769", "from 1 to 32768"],
+        ["[image]\nsize = [32768, 32768]", "[32768, 32768]", "2^28 pixels"],
+        ["[image]\nbackground = [0, -1, 0]", "-1", "at least 0"],
+        ["[image]\nbackground = '#12345'", "'#12345'", "a colour such as"],
+        ["[image]\nbackground = [0, 1, 0, 1]", "[0, 1, 0, 1]", "a list of 3"],
+        ["[march]\nplan = 'papr'", "'papr'", "`default`, `paper`, `exact`"],
+        ["[march]\nsamples = 0", "0", "from 1 to 4096"],
+        ["[march]\nstep = 0", "0", "from 0.001"],
+        ["[camera]\neye = [0, 0, 1]", "[camera]", "missing key `target`"],
+        ["[camera]\neye = [1, 2, 3]\ntarget = [1, 2, 3.0]", "[1, 2, 3.0]", "other than the eye"],
+        ["[camera]\neye = [0, 2, 1]\ntarget = [0, 1, 1]", "[0, 1, 1]", "line of sight"],
+        ["[camera]\neye = [0, 0, 1]\ntarget = [0, 0, 0]\nup = [0, 0, 9]", "[0, 0, 9]", "line of sight"],
+        ["[camera]\neye = [0, 0, 1]\ntarget = [0, 0, 0]\nfov = 180", "180", "between 0 and 180"],
+        ["[camera]\neye = [0, 0, 1]\ntarget = [0, 0, 0]\nnear = 0", "0", "greater than 0"],
     ];
 
     #[test]
     fn every_mistake_is_underlined() {
-        for [from, to, spot, part] in MISTAKES {
-            let text = SCENE.replacen(from, to, 1);
-            assert_ne!(text, SCENE, "{from}");
+        let changes = CHANGES.iter().map(|[from, to, spot, part]| (SCENE.replacen(from, to, 1), spot, part));
+        let additions = ADDITIONS.iter().map(|[added, spot, part]| (format!("{added}{SCENE}"), spot, part));
+        for (text, spot, part) in changes.chain(additions) {
+            assert_ne!(text, SCENE, "{part}");
             let error = parse("scene.toml", &text, folder().path()).map(drop).unwrap_err();
-            assert!(error.to_string().contains(part), "{to}: {error}");
-            let Error::Text { source_code, span, label, .. } = error else { panic!("{to}: {error}") };
-            assert_eq!(&source_code.inner()[span.offset()..span.offset() + span.len()], *spot, "{to}");
+            assert!(error.to_string().contains(part), "{text}: {error}");
+            let Error::Text { source_code, span, label, .. } = error else { panic!("{text}: {error}") };
+            assert_eq!(&source_code.inner()[span.offset()..span.offset() + span.len()], *spot, "{text}");
             assert!(!label.is_empty());
         }
     }

@@ -168,18 +168,9 @@ fn validate(mesh: &Mesh, options: &ShellOptions) -> Result<()> {
 mod tests {
     use super::*;
 
-    fn triangle() -> Mesh {
-        Mesh {
-            positions: vec![DVec3::ZERO, DVec3::X, DVec3::Y],
-            normals: vec![DVec3::Z; 3],
-            triangles: vec![[0, 1, 2]],
-            uvs: vec![[DVec2::ZERO, DVec2::X, DVec2::Y]],
-        }
-    }
-
     /// Asserts that the options and the mesh, once spoiled, are refused as usage, in these words.
     fn assert_refused(words: &str, spoil: impl Fn(&mut ShellOptions, &mut Mesh)) {
-        let (mut options, mut mesh) = (ShellOptions::new(1.0), triangle());
+        let (mut options, mut mesh) = (ShellOptions::new(1.0), Mesh::triangle());
         Shell::build(&mesh, &options).expect("sound before it is spoiled");
         spoil(&mut options, &mut mesh);
         let error = Shell::build(&mesh, &options).expect_err(words);
@@ -245,7 +236,7 @@ mod tests {
             uv_offset: DVec2::splat(0.25),
             ..ShellOptions::new(1.0)
         };
-        let shell = Shell::build(&triangle(), &options).unwrap();
+        let shell = Shell::build(&Mesh::triangle(), &options).unwrap();
         let corner = |u, v| DVec3::new(u, v, 0.0);
         let expected = [corner(0.25, 0.25), corner(2.25, 0.25), corner(0.25, 4.25)];
         assert_eq!(shell.texture[0][..3], expected);
@@ -254,7 +245,7 @@ mod tests {
     #[test]
     fn the_scale_is_per_position() {
         let options = ShellOptions { thickness_scale: vec![0.0, 1.0, 2.0], ..ShellOptions::new(0.5) };
-        let shell = Shell::build(&triangle(), &options).unwrap();
+        let shell = Shell::build(&Mesh::triangle(), &options).unwrap();
         assert_eq!([3, 4, 5].map(|id| shell.vertices[id].z), [0.0, 0.5, 1.0]);
     }
 }
