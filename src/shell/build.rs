@@ -92,7 +92,8 @@ impl Shell {
 
 impl ShellOptions {
     fn texture_uv(&self, uv: DVec2) -> DVec2 {
-        self.uv_scale * uv + self.uv_offset
+        // Whole turns of the offset change nothing, but would take digits from what is added.
+        self.uv_scale * uv + (self.uv_offset - self.uv_offset.floor())
     }
 }
 
@@ -240,6 +241,17 @@ mod tests {
         let corner = |u, v| DVec3::new(u, v, 0.0);
         let expected = [corner(0.25, 0.25), corner(2.25, 0.25), corner(0.25, 4.25)];
         assert_eq!(shell.texture[0][..3], expected);
+    }
+
+    #[test]
+    fn a_far_offset_moves_the_texture_as_a_near_one() {
+        let texture = |offset: f64| {
+            let options = ShellOptions { uv_offset: DVec2::splat(offset), ..ShellOptions::new(1.0) };
+            Shell::build(&Mesh::triangle(), &options).unwrap().texture
+        };
+        assert_eq!(texture(1e9 + 0.25), texture(0.25));
+        assert_eq!(texture(-1e9 + 0.25), texture(0.25));
+        assert_eq!(texture(1e30), texture(0.0), "at 1e30 every number is whole");
     }
 
     #[test]
