@@ -4,16 +4,19 @@
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 use mesoshell::Error;
 use mesoshell::gpu::{
     Batch, Buffer, DeviceChoice, Draw, Gpu, Messages, Pipeline, PipelineInfo, Target, Texture3d, devices,
     draw, shaders,
 };
+use mesoshell::mesh::Mesh;
 use mesoshell::mesh::generate::{Generator, Sphere};
 use mesoshell::method::shell::ViewConstants;
 use mesoshell::method::{self, Setup};
 use mesoshell::progress::{Interrupt, Progress};
+use mesoshell::scene::{March, Scene};
+use mesoshell::shell::{Shell, ShellOptions};
 use mesoshell::volume::{Pyramid, Quantity, Volume};
 
 fn watched(test: impl FnOnce(&Arc<Gpu>)) {
@@ -169,6 +172,28 @@ fn what_the_layers_say_is_heard() {
     let target = Target::new(&gpu, 4, 4, 1).unwrap();
     let _ = Pipeline::new(&gpu, &target, &shell_pipeline(4));
     assert!(!messages.all().is_empty());
+}
+
+#[test]
+fn a_texture_too_fine_for_a_tetrahedron_is_told() {
+    let render = |repeats: f64, march| {
+        let options = ShellOptions { uv_scale: DVec2::new(repeats, 1.0), ..ShellOptions::new(0.1) };
+        let volume = Volume::new([4, 1, 1], vec![[0.5; 4]; 4]).unwrap();
+        let shell = Shell::build(&Mesh::triangle(), &options).unwrap();
+        let mut scene = Scene::new(shell, Pyramid::build(volume), 0.1);
+        (scene.view.width, scene.view.height, scene.march) = (4, 4, march);
+        method::render(scene)
+    };
+    let is_warned = |repeats, march| {
+        let warnings = render(repeats, march).unwrap().report.warnings;
+        warnings.iter().any(|warning| warning.contains("shell.uv_scale"))
+    };
+    // At half a texel a sample, 65,535 samples are 8191.9 repeats of four texels.
+    let march = March::default();
+    assert!(!is_warned(8191.0, march) && is_warned(8193.0, march));
+    assert!(!is_warned(8193.0, March::Paper { samples: 10 }));
+    let error = render(262_145.0, march).unwrap_err();
+    assert!(matches!(error, Error::Usage { .. }) && error.to_string().contains("texels along u"), "{error}");
 }
 
 /// Stops the run as soon as a part of the march is done.

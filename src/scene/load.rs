@@ -8,7 +8,7 @@ use toml::Spanned;
 use super::camera::DEFAULT_NEAR;
 use super::file::{CameraSection, DensitySection, MeshSection, Plan, SceneFile, VolumeSection};
 use super::text::Text;
-use super::{Camera, March, Medium, Scene, Sizes, View};
+use super::{Camera, March, Medium, Scene, Sizes, View, span};
 use crate::frame::{Stage, Stopwatch};
 use crate::mesh::generate::Generator;
 use crate::mesh::projection::Projection;
@@ -106,7 +106,17 @@ fn build(
     let section = file.volume.get_ref();
     // The path that a density of 1 makes one optical depth long.
     let mean_free_path = section.density.as_ref().map(|density| density.extinction.0.recip());
-    let volume = volume.load(&admit)?;
+    let resolves = |size| {
+        span::check(&shell, size).map_err(|too_fine| {
+            let mesh = file.mesh.get_ref().file.as_ref().map(|file| base_dir.join(file));
+            let error = match (text.span_of("shell", "uv_scale"), mesh) {
+                (None, Some(mesh)) => Error::input(mesh, too_fine.to_string()),
+                (span, _) => text.error(span.unwrap_or(file.mesh.span()), too_fine.to_string()),
+            };
+            error.with_help(span::TooFine::HELP)
+        })
+    };
+    let volume = volume.load(&admit, &resolves)?;
     let texel_along_w = options.thickness / f64::from(volume.size[2]);
     stopwatch.lap("load.volume");
 
@@ -203,12 +213,21 @@ impl VolumeSource {
         }
     }
 
-    fn load(self, admit: &dyn Fn([u32; 3]) -> Result<()>) -> Result<Volume> {
+    /// `admit` has been asked about a recipe's size; whether the shell `resolves` it has not.
+    fn load(
+        self,
+        admit: &dyn Fn([u32; 3]) -> Result<()>,
+        resolves: &dyn Fn([u32; 3]) -> Result<()>,
+    ) -> Result<Volume> {
         match self {
-            Self::Recipe(recipe) => recipe.build(),
+            Self::Recipe(recipe) => {
+                resolves(recipe.header().size)?;
+                recipe.build()
+            }
             Self::File(path, interpretation) => {
                 let raw = volume::read(&path)?;
                 admit(raw.size)?;
+                resolves(raw.size)?;
                 Volume::from_raw(raw, &interpretation)
             }
         }
@@ -401,6 +420,26 @@ recipe = "fog.toml"
             Err(Error::Interrupted)
         };
         assert!(matches!(build(&text, folder.path(), &Silent, &refuse), Err(Error::Interrupted)));
+    }
+
+    #[test]
+    fn a_texture_too_fine_to_resolve_is_blamed_on_who_made_it() {
+        let folder = folder();
+        let told = |text: &str, overrides: &[String], parts: &[&str]| {
+            let text = Text::new("scene.toml", text.to_owned(), overrides).unwrap();
+            let error = build(&text, folder.path(), &Silent, &|_| Ok(())).map(drop).unwrap_err();
+            let report = format!("{:?}", miette::Report::new_boxed(Box::new(error)));
+            for part in parts.iter().chain(&["texels along u", "shell.uv_scale", "texture coordinates"]) {
+                assert!(report.contains(part), "{report}");
+            }
+        };
+        let scaled = SCENE.replace("0.1", "0.1\nuv_scale = [1e30, 1]");
+        told(&scaled, &[], &["[1e30, 1]", "1048576"]);
+        told(SCENE, &["shell.uv_scale=[1e30, 1]".to_owned()], &["-D shell.uv_scale", "1048576"]);
+        let mesh = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1e9 0\nvt 0 1\nf 1/1 2/2 3/3\n";
+        std::fs::write(folder.path().join("wild.obj"), mesh).unwrap();
+        let generator = "generator = \"torus\"\nsegments = 8\nrings = 4";
+        told(&SCENE.replace(generator, "file = 'wild.obj'"), &[], &["wild.obj", "triangle 0", "1048576"]);
     }
 
     #[test]
