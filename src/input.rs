@@ -8,6 +8,10 @@ use std::path::Path;
 /// The longest text that a person writes: a scene, a recipe, a sweep; in bytes.
 pub const LONGEST_TEXT: u64 = 1 << 20;
 
+/// DEFLATE, the densest compression of any file that is read, turns no byte into more (a match of 258 bytes takes at least two
+/// bits).
+pub const MAX_DEFLATE_RATIO: u64 = 1032;
+
 /// A regular file, open for reading, and its length in bytes.
 ///
 /// # Errors

@@ -19,9 +19,6 @@ use crate::{Error, Result, input, output};
 /// The most pixels that are read: 4 GiB of f32 RGBA.
 const MOST_PIXELS: u64 = 1 << 28;
 
-/// Deflate, the densest compression in either format, makes at most 1032 bytes of one.
-const MOST_BYTES_PER_FILE_BYTE: u64 = 1032;
-
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Format {
     Png,
@@ -177,7 +174,7 @@ fn check_size(path: &Path, size: [u64; 2], length: u64, pixels_per_byte: u64) ->
         let message = format!("claims {width}x{height} pixels, but at most 2^28 are read");
         return Err(Error::input(path, message).with_help("if the image is really that large, scale it down"));
     }
-    let most = length.saturating_mul(MOST_BYTES_PER_FILE_BYTE).saturating_mul(pixels_per_byte);
+    let most = length.saturating_mul(input::MAX_DEFLATE_RATIO).saturating_mul(pixels_per_byte);
     if pixels > most {
         let message = format!("claims {width}x{height} pixels, but {length} bytes cannot hold them");
         return Err(Error::input(path, message).with_help("the file is damaged or cut off: make it again"));

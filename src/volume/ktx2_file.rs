@@ -12,7 +12,8 @@ use ktx2::dfd::{Basic, Block};
 use ktx2::{Header, Index, LevelIndex, SupercompressionScheme};
 
 use super::raw::{check_fits_memory, claimed_size, open, unreadable};
-use super::{AlphaMode, MAX_DEFLATE_RATIO, RawVolume, Sample, Volume};
+use super::{AlphaMode, RawVolume, Sample, Volume};
+use crate::input::MAX_DEFLATE_RATIO;
 use crate::{Error, Result, output};
 
 /// Reads level 0 of the 3D texture at `path`.
@@ -50,7 +51,7 @@ pub(super) fn read(path: &Path) -> Result<RawVolume> {
         }
         None => return Err(wrong_length(level.byte_length)),
         Some(SupercompressionScheme::ZLIB) => {
-            if (byte_count / MAX_DEFLATE_RATIO) as u64 > level.byte_length {
+            if byte_count as u64 / MAX_DEFLATE_RATIO > level.byte_length {
                 return Err(wrong_length(level.byte_length));
             }
             check_fits_memory(path, size)?;

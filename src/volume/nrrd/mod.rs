@@ -14,7 +14,8 @@ use std::path::Path;
 use flate2::read::MultiGzDecoder;
 
 use super::raw::{check_fits_memory, claimed_size, open, unreadable};
-use super::{AlphaMode, MAX_DEFLATE_RATIO, RawVolume};
+use super::{AlphaMode, RawVolume};
+use crate::input::MAX_DEFLATE_RATIO;
 use crate::{Error, Result};
 use header::{Encoding, Header};
 
@@ -93,7 +94,7 @@ pub(super) fn read(path: &Path) -> Result<RawVolume> {
             header.number.decode(&bytes, header.little_endian)
         }
         Encoding::Gzip => {
-            if (promised / MAX_DEFLATE_RATIO) as u64 > left {
+            if promised as u64 / MAX_DEFLATE_RATIO > left {
                 return Err(wrong_length("fewer"));
             }
             check_fits_memory(path, size)?;
