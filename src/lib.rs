@@ -32,6 +32,7 @@ pub mod bench;
 pub mod error;
 pub mod frame;
 pub mod gpu;
+mod input;
 pub mod mesh;
 pub mod method;
 pub mod metric;

@@ -164,6 +164,18 @@ fn bad_requests_are_told() {
     desk.refuses("a.exr nowhere.exr --map nowhere/map.png", 6, &["nowhere/map.png"]);
     desk.refuses("a.exr text.png --flip-map text.png", 2, &["text.png", "two things"]);
     desk.refuses("a.exr a.exr --map m.png --flip-map m.png", 2, &["m.png", "two things"]);
+    // However it is written, and through links.
+    fs::create_dir(desk.path().join("sub")).unwrap();
+    desk.image("a.png", &[GREY; 4]);
+    desk.refuses("a.png a.exr --map ./sub/../a.png", 2, &["a.png", "two things"]);
+    desk.refuses("a.exr a.exr --map m.png --flip-map sub/../m.png", 2, &["m.png", "two things"]);
+    #[cfg(unix)]
+    {
+        std::os::unix::fs::symlink("a.png", desk.path().join("link.png")).unwrap();
+        desk.refuses("link.png a.exr --flip-map a.png", 2, &["a.png", "two things"]);
+        std::os::unix::fs::symlink("sub", desk.path().join("same")).unwrap();
+        desk.refuses("a.exr a.exr --map sub/m.png --flip-map same/m.png", 2, &["m.png", "two things"]);
+    }
     desk.refuses("a.exr a.exr --range 1", 2, &["--map"]);
     for range in ["0", "nan", "inf", "wide"] {
         desk.refuses(&format!("a.exr a.exr --map m.png --range {range}"), 2, &["above 0"]);

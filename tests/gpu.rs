@@ -4,16 +4,19 @@
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 use mesoshell::Error;
 use mesoshell::gpu::{
     Batch, Buffer, DeviceChoice, Draw, Gpu, Messages, Pipeline, PipelineInfo, Target, Texture3d, devices,
     draw, shaders,
 };
+use mesoshell::mesh::Mesh;
 use mesoshell::mesh::generate::{Generator, Sphere};
 use mesoshell::method::shell::ViewConstants;
 use mesoshell::method::{self, Setup};
 use mesoshell::progress::{Interrupt, Progress};
+use mesoshell::scene::{March, Scene};
+use mesoshell::shell::{Shell, ShellOptions};
 use mesoshell::volume::{Pyramid, Quantity, Volume};
 
 fn watched(test: impl FnOnce(&Arc<Gpu>)) {
@@ -28,6 +31,18 @@ fn watched(test: impl FnOnce(&Arc<Gpu>)) {
 fn empty(size: [u32; 3]) -> Pyramid {
     let texels = size.iter().map(|side| *side as usize).product();
     Pyramid { levels: vec![Volume { size, texels: vec![[0.0; 4]; texels], quantity: Quantity::Opacity }] }
+}
+
+/// The pipeline of the sorted tetrahedra.
+fn shell_pipeline(push_constant_bytes: u32) -> PipelineInfo<'static> {
+    PipelineInfo {
+        vertex: shaders::SHELL_VERT,
+        fragment: shaders::SHELL_FRAG,
+        constants: &[],
+        storage_buffers: 3,
+        textures: 1,
+        push_constant_bytes,
+    }
 }
 
 #[test]
@@ -126,15 +141,8 @@ fn a_draw_whose_parts_do_not_fit_reaches_no_device() {
     watched(|gpu| {
         let other = Gpu::open(&DeviceChoice::Any, None).unwrap();
         let target = |gpu, attachments| Target::new(gpu, 4, 4, attachments).unwrap();
-        let info = PipelineInfo {
-            vertex: shaders::SHELL_VERT,
-            fragment: shaders::SHELL_FRAG,
-            constants: &[],
-            storage_buffers: 3,
-            textures: 1,
-            push_constant_bytes: size_of::<ViewConstants>() as u32,
-        };
-        let pipeline = Pipeline::new(gpu, &target(gpu, 1), &info).unwrap();
+        let bytes = size_of::<ViewConstants>();
+        let pipeline = Pipeline::new(gpu, &target(gpu, 1), &shell_pipeline(bytes as u32)).unwrap();
         let buffer = |gpu| Buffer::storage(gpu, "nothing", &[0u32; 64]).unwrap();
         let volume = Texture3d::upload(gpu, "the volume", &empty([1, 1, 1])).unwrap();
         let draws = |target: &Target, buffers: &[&Buffer], bytes: usize| {
@@ -146,7 +154,6 @@ fn a_draw_whose_parts_do_not_fit_reaches_no_device() {
             catch_unwind(AssertUnwindSafe(|| draw(&parts).unwrap())).is_ok()
         };
         let (own, foreign) = (buffer(gpu), buffer(&other));
-        let bytes = size_of::<ViewConstants>();
         assert!(draws(&target(gpu, 1), &[&own; 3], bytes));
         assert!(!draws(&target(gpu, 2), &[&own; 3], bytes), "another number of attachments");
         assert!(!draws(&target(gpu, 1), &[&own; 2], bytes), "a buffer is missing");
@@ -163,16 +170,30 @@ fn what_the_layers_say_is_heard() {
     let messages = Messages::default();
     let gpu = Gpu::open(&DeviceChoice::Any, Some(&messages)).unwrap();
     let target = Target::new(&gpu, 4, 4, 1).unwrap();
-    let info = PipelineInfo {
-        vertex: shaders::SHELL_VERT,
-        fragment: shaders::SHELL_FRAG,
-        constants: &[],
-        storage_buffers: 3,
-        textures: 1,
-        push_constant_bytes: 4,
-    };
-    let _ = Pipeline::new(&gpu, &target, &info);
+    let _ = Pipeline::new(&gpu, &target, &shell_pipeline(4));
     assert!(!messages.all().is_empty());
+}
+
+#[test]
+fn a_texture_too_fine_for_a_tetrahedron_is_told() {
+    let render = |repeats: f64, march| {
+        let options = ShellOptions { uv_scale: DVec2::new(repeats, 1.0), ..ShellOptions::new(0.1) };
+        let volume = Volume::new([4, 1, 1], vec![[0.5; 4]; 4]).unwrap();
+        let shell = Shell::build(&Mesh::triangle(), &options).unwrap();
+        let mut scene = Scene::new(shell, Pyramid::build(volume), 0.1);
+        (scene.view.width, scene.view.height, scene.march) = (4, 4, march);
+        method::render(scene)
+    };
+    let is_warned = |repeats, march| {
+        let warnings = render(repeats, march).unwrap().report.warnings;
+        warnings.iter().any(|warning| warning.contains("shell.uv_scale"))
+    };
+    // At half a texel a sample, 65,535 samples are 8191.9 repeats of four texels.
+    let march = March::default();
+    assert!(!is_warned(8191.0, march) && is_warned(8193.0, march));
+    assert!(!is_warned(8193.0, March::Paper { samples: 10 }));
+    let error = render(262_145.0, march).unwrap_err();
+    assert!(matches!(error, Error::Usage { .. }) && error.to_string().contains("texels along u"), "{error}");
 }
 
 /// Stops the run as soon as a part of the march is done.

@@ -23,15 +23,6 @@ fn generate(generator: Generator) -> Mesh {
     generator.build().expect("sound parameters")
 }
 
-fn triangle() -> Mesh {
-    Mesh {
-        positions: vec![DVec3::ZERO, DVec3::X, DVec3::Y],
-        normals: vec![DVec3::Z; 3],
-        triangles: vec![[0, 1, 2]],
-        uvs: vec![[DVec2::ZERO, DVec2::X, DVec2::Y]],
-    }
-}
-
 fn plane() -> Mesh {
     generate(Generator::Plane(Plane { size: 2.0, segments: 4 }))
 }
@@ -56,7 +47,7 @@ fn teapot() -> Mesh {
 
 fn all() -> [(&'static str, Mesh); 6] {
     [
-        ("triangle", triangle()),
+        ("triangle", Mesh::triangle()),
         ("plane", plane()),
         ("tube", tube()),
         ("sphere", sphere()),
@@ -241,7 +232,7 @@ fn tetrahedra_of_a_closed_mesh_fill_the_space_between_its_surfaces() {
 #[test]
 fn a_flat_layer_has_area_times_thickness() {
     assert!(same_sum(six_volumes(&build(&plane(), 0.3)), 6.0 * 4.0 * 0.3, 24.0));
-    assert!(same_sum(six_volumes(&build(&triangle(), 0.3)), 6.0 * 0.5 * 0.3, 1.0));
+    assert!(same_sum(six_volumes(&build(&Mesh::triangle(), 0.3)), 6.0 * 0.5 * 0.3, 1.0));
 }
 
 /// The largest error of the texture maps, in units of what rounding may do to them.
@@ -377,7 +368,7 @@ fn planes_face_inward_and_are_shared() {
 #[test]
 fn a_cell_without_volume_has_neither_planes_nor_coordinates() {
     let options = ShellOptions { thickness_scale: vec![0.0; 3], ..ShellOptions::new(1.0) };
-    let shell = Shell::build(&triangle(), &options).expect("a sound mesh");
+    let shell = Shell::build(&Mesh::triangle(), &options).expect("a sound mesh");
     for t in 0..3 {
         assert_eq!(shell.planes(t), [DVec4::ZERO; 4]);
         assert_eq!(shell.barycentric(t, DVec3::ONE), [0.0; 4]);
@@ -438,7 +429,7 @@ fn any_prism() -> impl Strategy<Value = Shell> {
     let jitter = || prop::array::uniform3(prop::array::uniform3(-0.4..0.4f64));
     let order = Just([0u32, 1, 2]).prop_shuffle();
     (jitter(), jitter(), order).prop_filter_map("folded", |(base, outer, order)| {
-        let mut mesh = triangle();
+        let mut mesh = Mesh::triangle();
         for i in 0..3 {
             mesh.positions[i] += DVec3::from_array(base[i]);
             mesh.normals[i] += DVec3::from_array(outer[i]);

@@ -5,11 +5,9 @@ mod common;
 use std::process::Command;
 use std::sync::Arc;
 
-use common::Watched;
+use common::{Watched, set_up};
 use glam::{DVec2, DVec3};
-use mesoshell::gpu::{DeviceChoice, Messages};
-use mesoshell::method::Setup;
-use mesoshell::progress::{Interrupt, Progress, Silent};
+use mesoshell::gpu::Messages;
 use mesoshell::reference::Reference;
 use mesoshell::scene::{Scene, View};
 use mesoshell::shell::{EXTERIOR, Shell};
@@ -21,22 +19,17 @@ use proptest::prelude::*;
 #[test]
 fn every_case_stays_within_its_bound() {
     let messages = Messages::default();
-    let progress: Arc<dyn Progress> = Arc::new(Silent);
-    let setup = Setup {
-        device: &DeviceChoice::Any,
-        validation: Some(&messages),
-        progress: &progress,
-        interrupt: &Interrupt::default(),
-    };
-    let stand = Stand { setup, extent: Extent::Quick };
     let mut failed = Vec::new();
-    for case in cases() {
-        let outcome = case.run(&stand).unwrap_or_else(|error| panic!("{}: {error}", case.name));
-        println!("{:26} {:9.2e} of {:9.2e}, {}", case.name, outcome.worst, outcome.bound, case.measure);
-        if !outcome.passed {
-            failed.push(case.name);
+    set_up(&messages, |setup| {
+        let stand = Stand { setup, extent: Extent::Quick };
+        for case in cases() {
+            let outcome = case.run(&stand).unwrap_or_else(|error| panic!("{}: {error}", case.name));
+            println!("{:26} {:9.2e} of {:9.2e}, {}", case.name, outcome.worst, outcome.bound, case.measure);
+            if !outcome.passed {
+                failed.push(case.name);
+            }
         }
-    }
+    });
     assert!(failed.is_empty(), "beyond their bounds: {failed:?}");
     assert!(messages.all().is_empty(), "the validation layers said:\n{}", messages.all().join("\n"));
 }

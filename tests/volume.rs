@@ -5,6 +5,7 @@ use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 use mesoshell::Error;
+use mesoshell::mesh::obj;
 use mesoshell::value::Colour;
 use mesoshell::volume::{
     AlphaMode, ControlPoint, Interpretation, RawVolume, Sample, TransferFunction, Volume, info, read,
@@ -207,6 +208,42 @@ fn nrrd_text_and_gzip_are_bounded_by_what_the_file_holds() {
     let bomb = bomb.finish().unwrap();
     assert!(folder.refusal("bomb.nrrd", &nrrd(&fields("gzip"), &bomb)).contains("fewer"));
     assert!(folder.refusal("bomb.nrrd", &nrrd(&SMALL_NRRD.replace("raw", "gzip"), &bomb)).contains("more"));
+}
+
+/// As long as no memory and no patience is: what a header does not promise is not read.
+#[test]
+fn a_file_of_a_tebibyte_is_not_read_to_its_end() {
+    let folder = Scratch::new();
+    let stretched = |name: &str, bytes: &[u8]| {
+        let path = folder.path(name);
+        std::fs::write(&path, bytes).unwrap();
+        // A hole: it takes no place on the disk.
+        std::fs::File::options().write(true).open(&path).unwrap().set_len(1 << 40).unwrap();
+        path
+    };
+    let path = stretched("long.nrrd", &nrrd(SMALL_NRRD, &[0; 32]));
+    assert!(refusal(&path, read(&path)).contains("more than the 32 bytes"));
+    let path = stretched("long.nrrd", &nrrd(&SMALL_NRRD.replace("raw", "text"), b"1 2 3 4 5 6 7 8"));
+    assert!(refusal(&path, read(&path)).contains("has a word of more than"));
+    let path = stretched("long.nrrd", &nrrd(&SMALL_NRRD.replace("raw", "raw\nbyte skip: -1"), &[]));
+    assert_eq!(read(&path).unwrap().values, [0.0; 8], "its end");
+    let path = stretched("long.nrrd", format!("NRRD0005\n{SMALL_NRRD}\n#").as_bytes());
+    assert!(refusal(&path, read(&path)).contains("its header is longer than 1024 KiB"));
+    // What follows level 0 is no matter of ours.
+    let path = stretched("long.ktx2", &small_ktx2(&folder));
+    assert_eq!(read(&path).unwrap(), RawVolume { path, ..read(&folder.path("good.ktx2")).unwrap() });
+    let path = stretched("long.obj", b"v 0 0 0\n");
+    assert!(refusal(&path, obj::load(&path, None)).contains("it is longer than 2048 MiB"));
+}
+
+#[cfg(unix)]
+#[test]
+fn a_pipe_is_no_volume_and_no_mesh() {
+    let folder = Scratch::new();
+    let path = folder.path("pipe");
+    assert!(std::process::Command::new("mkfifo").arg(&path).status().unwrap().success());
+    assert!(refusal(&path, read(&path)).contains("no regular file"));
+    assert!(refusal(&path, obj::load(&path, None)).contains("no regular file"));
 }
 
 #[test]

@@ -36,12 +36,12 @@ vec4 fetch(Path path, float depth) {
     return mix(textureLod(volume, point, fine), textureLod(volume, point, min(fine + 1.0, view.last_level)), level - fine);
 }
 
-// How many samples the plan gives to a segment.
+// How many samples the plan gives to a segment: no more than `MOST_SAMPLES` of src/method/shell.
 uint sample_count(Path path, float entry, float exit) {
     if (PLAN == 1) return view.samples;
     float texel = MINIFIED ? exp2(floor(level_of_detail(path, 0.5 * (entry + exit)))) : 1.0;
     float texels = length(path.from_depth * view.texels) * (exit - entry) / texel;
-    return uint(clamp(ceil(texels / view.step), 1.0, 65536.0));
+    return uint(clamp(ceil(texels / view.step), 1.0, 65535.0));
 }
 
 // Optical depth of a path of one opacity distance through this texel.

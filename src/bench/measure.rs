@@ -157,7 +157,7 @@ impl Contender {
 fn points(subject: &Subject<'_>, contenders: &[Contender], reference: &Image) -> Result<Vec<Point>> {
     let background = subject.background.unwrap_or_default();
     let point = |(setting, contender): (&Setting, &Contender)| {
-        let metrics = metric::compare_over(&contender.warm_up.image, reference, background)?;
+        let metrics = metric::compare_over(&contender.warm_up.image, reference, background)?.metrics;
         Ok(Point::new(setting.clone(), &metrics))
     };
     subject.settings.iter().zip(contenders).map(point).collect()

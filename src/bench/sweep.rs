@@ -11,7 +11,7 @@ use crate::method::{self, METHODS};
 use crate::scene::March;
 use crate::scene::text::Text;
 use crate::value::{PictureSize, Runs, Samples, Step};
-use crate::{Error, Result};
+use crate::{Error, Result, input};
 
 /// What is measured.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -164,7 +164,7 @@ impl Sweep {
     /// # Errors
     /// [`Error::Input`] for a file that cannot be read, else as [`parse`](Self::parse).
     pub fn load(path: &Path) -> Result<Self> {
-        let text = std::fs::read_to_string(path).map_err(|error| {
+        let text = input::text(path).map_err(|error| {
             Error::input(path, format!("the sweep file cannot be read: {error}"))
                 .with_help("check the path, or write the sweep that docs/bench.md describes")
         })?;
@@ -222,8 +222,13 @@ impl Sweep {
     }
 }
 
-/// Whether a TOML text is meant to be a sweep, not a scene: by the keys that only a sweep has.
-pub fn looks_like_sweep(text: &str) -> bool {
+/// Whether a file is meant to be a sweep, not a scene.
+pub fn is_sweep(path: &Path) -> bool {
+    input::text(path).is_ok_and(|text| looks_like_sweep(&text))
+}
+
+/// By the keys that only a sweep has.
+fn looks_like_sweep(text: &str) -> bool {
     toml::de::DeTable::parse(text)
         .is_ok_and(|table| ["scenes", "plans"].iter().any(|&key| table.get_ref().get(key).is_some()))
 }

@@ -1,7 +1,7 @@
 //! `mesoshell bench`: run time against error, of a sweep or of some scenes.
 
 use std::io::{IsTerminal, stderr};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -79,11 +79,9 @@ pub fn run(arguments: Arguments, talk: Talk) -> Result<()> {
 fn what(arguments: &Arguments) -> Result<Sweep> {
     let usage =
         |message: &str, help: &str| Error::Usage { message: message.to_owned(), help: Some(help.to_owned()) };
-    let is_sweep =
-        |path: &Path| std::fs::read_to_string(path).is_ok_and(|text| sweep::looks_like_sweep(&text));
     let levels_given = arguments.steps.is_some() || arguments.samples.is_some() || arguments.exact;
     let mut sweep = match arguments.files.as_slice() {
-        [file] if is_sweep(file) => {
+        [file] if sweep::is_sweep(file) => {
             if levels_given {
                 return Err(usage(
                     "a sweep file says itself what is measured",
@@ -92,7 +90,7 @@ fn what(arguments: &Arguments) -> Result<Sweep> {
             }
             Sweep::load(file)?
         }
-        files if files.iter().any(|file| is_sweep(file)) => {
+        files if files.iter().any(|file| sweep::is_sweep(file)) => {
             return Err(usage("a sweep file stands alone", "name either one sweep file or scene files"));
         }
         scenes => Sweep::of_scenes(scenes, &[METHODS[0].name], &levels(arguments)?),

@@ -5,7 +5,7 @@ use std::process::ExitCode;
 
 use clap::{Args, ValueEnum};
 use mesoshell::frame::{Image, file};
-use mesoshell::metric::{self, Metrics, flip, map};
+use mesoshell::metric::{self, Comparison, Metrics, map};
 use mesoshell::{Error, Result};
 use serde::Serialize;
 
@@ -87,7 +87,7 @@ pub fn run(arguments: Arguments, talk: Talk) -> Result<ExitCode> {
     let Arguments { a: a_path, b: b_path, metric, threshold, background, map, range, flip_map } = arguments;
     check_outputs(&[&a_path, &b_path], &[&map, &flip_map])?;
     let (a, b) = (file::read(&a_path)?, file::read(&b_path)?);
-    let metrics = metric::compare_over(&a, &b, background)?;
+    let Comparison { metrics, flip_errors } = metric::compare_over(&a, &b, background)?;
     if map.is_some() || flip_map.is_some() {
         check_numbers(&a_path, &a)?;
         check_numbers(&b_path, &b)?;
@@ -99,7 +99,7 @@ pub fn run(arguments: Arguments, talk: Talk) -> Result<ExitCode> {
         file::write(path, &map::signed(&differences, a.width, range), Some([0.0; 3]))?;
     }
     if let Some(path) = flip_map {
-        file::write(path, &map::flip(&flip::errors(&a, &b, background)?, a.width), Some([0.0; 3]))?;
+        file::write(path, &map::flip(&flip_errors, a.width), Some([0.0; 3]))?;
     }
 
     let difference = Difference { metrics, map_range };
@@ -120,18 +120,30 @@ pub fn run(arguments: Arguments, talk: Talk) -> Result<ExitCode> {
 }
 
 /// Finds out, before anything is read, whether the maps can be written, and that they replace neither image nor
-/// each other.
+/// each other, by whatever names they are called.
 fn check_outputs(images: &[&Path], maps: &[&Option<PathBuf>]) -> Result<()> {
-    let mut taken: Vec<&Path> = images.to_vec();
+    let mut taken: Vec<PathBuf> = images.iter().copied().map(real_path).collect();
     for path in maps.iter().copied().flatten() {
-        if taken.contains(&path.as_path()) {
+        let real = real_path(path);
+        if taken.contains(&real) {
             let message = format!("{}: named for two things", path.display());
             return Err(Error::Usage { message, help: Some("give each map a file of its own".into()) });
         }
         file::check_writable(path)?;
-        taken.push(path);
+        taken.push(real);
     }
     Ok(())
+}
+
+/// One path for all names of a file, whether it is there already or not.
+fn real_path(path: &Path) -> PathBuf {
+    path.canonicalize().unwrap_or_else(|_| match (path.parent(), path.file_name()) {
+        (Some(parent), Some(name)) => {
+            let parent = if parent.as_os_str().is_empty() { Path::new(".") } else { parent };
+            parent.canonicalize().unwrap_or_else(|_| parent.to_owned()).join(name)
+        }
+        _ => path.to_owned(),
+    })
 }
 
 /// A value that is not finite has no place on a map.

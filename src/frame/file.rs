@@ -5,7 +5,6 @@
 
 mod exr_header;
 
-use std::fs::File;
 use std::io::{BufReader, BufWriter, Write};
 use std::path::Path;
 
@@ -15,13 +14,10 @@ use image::{DynamicImage, ExtendedColorType, ImageDecoder, ImageEncoder, ImageEr
 
 use super::Image;
 use super::srgb::{linear_from_srgb, srgb_from_linear};
-use crate::{Error, Result, output};
+use crate::{Error, Result, input, output};
 
 /// The most pixels that are read: 4 GiB of f32 RGBA.
 const MOST_PIXELS: u64 = 1 << 28;
-
-/// Deflate, the densest compression in either format, makes at most 1032 bytes of one.
-const MOST_BYTES_PER_FILE_BYTE: u64 = 1032;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Format {
@@ -93,13 +89,9 @@ pub fn write(path: impl AsRef<Path>, image: &Image, background: Option<[f32; 3]>
 pub fn read(path: impl AsRef<Path>) -> Result<Image> {
     let path = path.as_ref();
     let format = Format::of(path)?;
-    let open = || -> std::io::Result<(BufReader<File>, u64)> {
-        let file = File::open(path)?;
-        let length = file.metadata()?.len();
-        Ok((BufReader::new(file), length))
-    };
-    let (mut file, length) =
-        open().map_err(|error| Error::input(path, format!("cannot be read: {error}")))?;
+    let (file, length) =
+        input::open(path).map_err(|error| Error::input(path, format!("cannot be read: {error}")))?;
+    let mut file = BufReader::new(file);
     let damaged = |error: ImageError| {
         Error::input(path, format!("cannot be decoded: {error}"))
             .with_help("is it complete, and what its extension says?")
@@ -182,7 +174,7 @@ fn check_size(path: &Path, size: [u64; 2], length: u64, pixels_per_byte: u64) ->
         let message = format!("claims {width}x{height} pixels, but at most 2^28 are read");
         return Err(Error::input(path, message).with_help("if the image is really that large, scale it down"));
     }
-    let most = length.saturating_mul(MOST_BYTES_PER_FILE_BYTE).saturating_mul(pixels_per_byte);
+    let most = length.saturating_mul(input::MAX_DEFLATE_RATIO).saturating_mul(pixels_per_byte);
     if pixels > most {
         let message = format!("claims {width}x{height} pixels, but {length} bytes cannot hold them");
         return Err(Error::input(path, message).with_help("the file is damaged or cut off: make it again"));

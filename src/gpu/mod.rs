@@ -12,6 +12,7 @@ pub mod device;
 pub mod draw;
 mod format;
 mod image;
+pub mod instance;
 mod memory;
 pub mod pipeline;
 pub mod shaders;
@@ -20,8 +21,9 @@ pub mod target;
 pub mod texture;
 
 pub use buffer::Buffer;
-pub use device::{DeviceChoice, DeviceInfo, Gpu, Messages, devices};
+pub use device::{DeviceChoice, Gpu};
 pub use draw::{Batch, Draw, DrawTimes, draw};
+pub use instance::{DeviceInfo, Messages, devices};
 pub use pipeline::{Pipeline, PipelineInfo};
 pub use target::Target;
 pub use texture::Texture3d;

@@ -34,6 +34,16 @@ pub struct Mesh {
 pub const LARGEST_COORDINATE: f64 = 1e32;
 
 impl Mesh {
+    /// The least mesh that there is: a right angle at the origin, legs of length 1 along X and Y, facing Z; (u, v) is (x, y).
+    pub fn triangle() -> Self {
+        Self {
+            positions: vec![DVec3::ZERO, DVec3::X, DVec3::Y],
+            normals: vec![DVec3::Z; 3],
+            triangles: vec![[0, 1, 2]],
+            uvs: vec![[DVec2::ZERO, DVec2::X, DVec2::Y]],
+        }
+    }
+
     /// Checks what every builder promises, except that no two positions are equal: that is
     /// [`weld`](weld::weld)'s work.
     ///
@@ -85,12 +95,7 @@ mod tests {
 
     #[test]
     fn validation_finds_each_defect() {
-        let good = Mesh {
-            positions: vec![DVec3::ZERO, DVec3::X, DVec3::Y],
-            normals: vec![DVec3::Z; 3],
-            triangles: vec![[0, 1, 2]],
-            uvs: vec![[DVec2::ZERO, DVec2::X, DVec2::Y]],
-        };
+        let good = Mesh::triangle();
         assert_eq!(good.validate(), Ok(()));
         type Spoil = fn(&mut Mesh);
         let defects: [(Spoil, &str); 7] = [

@@ -33,19 +33,28 @@ pub struct Metrics {
     pub pixels: u64,
 }
 
+/// The differences between two images, and where FLIP sees them.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Comparison {
+    /// Over all pixels.
+    pub metrics: Metrics,
+    /// The FLIP error of each pixel, row by row from the top left; empty where a value is not finite.
+    pub flip_errors: Vec<f32>,
+}
+
 /// Compares two images, for FLIP over black; neither is preferred.
 ///
 /// # Errors
 /// [`Error::Usage`] when their sizes differ, or when they have no pixels.
 pub fn compare(a: &Image, b: &Image) -> Result<Metrics> {
-    compare_over(a, b, [0.0; 3])
+    Ok(compare_over(a, b, [0.0; 3])?.metrics)
 }
 
-/// As [`compare`], for FLIP over `background` (linear RGB).
+/// As [`compare`], for FLIP over `background` (linear RGB), which is kept pixel by pixel.
 ///
 /// # Errors
 /// As [`compare`].
-pub fn compare_over(a: &Image, b: &Image, background: [f32; 3]) -> Result<Metrics> {
+pub fn compare_over(a: &Image, b: &Image, background: [f32; 3]) -> Result<Comparison> {
     check_sizes(a, b)?;
     let mut sum_of_squares = 0.0;
     let mut largest: Vec<f64> = Vec::with_capacity(a.rgba.len());
@@ -59,12 +68,14 @@ pub fn compare_over(a: &Image, b: &Image, background: [f32; 3]) -> Result<Metric
 
     let p999 = percentile_999(&mut largest);
     let max = largest.into_iter().fold(0.0, f64::max);
-    let flip = if max.is_finite() {
-        flip::errors(a, b, background)?.into_iter().map(f64::from).sum::<f64>() / pixels as f64
+    let (flip, flip_errors) = if max.is_finite() {
+        let errors = flip::errors(a, b, background)?;
+        (errors.iter().copied().map(f64::from).sum::<f64>() / pixels as f64, errors)
     } else {
-        f64::INFINITY
+        (f64::INFINITY, Vec::new())
     };
-    Ok(Metrics { rmse, max, p999, psnr: -20.0 * rmse.log10(), flip, pixels: pixels as u64 })
+    let metrics = Metrics { rmse, max, p999, psnr: -20.0 * rmse.log10(), flip, pixels: pixels as u64 };
+    Ok(Comparison { metrics, flip_errors })
 }
 
 /// The nearest rank: the smallest value that at least 99.9 % of them do not exceed.

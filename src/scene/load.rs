@@ -1,6 +1,5 @@
 //! From the text of a scene file to the [`Scene`] that it describes.
 
-use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use glam::{DVec2, DVec3};
@@ -9,7 +8,7 @@ use toml::Spanned;
 use super::camera::DEFAULT_NEAR;
 use super::file::{CameraSection, DensitySection, MeshSection, Plan, SceneFile, VolumeSection};
 use super::text::Text;
-use super::{Camera, March, Medium, Scene, Sizes, View};
+use super::{Camera, March, Medium, Scene, Sizes, View, span};
 use crate::frame::{Stage, Stopwatch};
 use crate::mesh::generate::Generator;
 use crate::mesh::projection::Projection;
@@ -19,10 +18,7 @@ use crate::shell::{Shell, ShellOptions};
 use crate::value::{Exactly, Finite};
 use crate::volume::recipe::{self, Recipe};
 use crate::volume::{self, Interpretation, Pyramid, Volume};
-use crate::{Error, Result};
-
-/// No scene file that a person wrote is longer, in bytes.
-const LONGEST_SCENE_FILE: u64 = 1 << 20;
+use crate::{Error, Result, input};
 
 /// A scene, with what its file says beyond it.
 #[derive(Debug, Clone)]
@@ -59,12 +55,7 @@ pub fn load_if(
         Error::input(path, format!("the scene file cannot be read: {error}"))
             .with_help("check the path, or write the scene that docs/scene.md describes")
     };
-    let mut text = String::new();
-    let file = std::fs::File::open(path).map_err(unreadable)?;
-    file.take(LONGEST_SCENE_FILE + 1).read_to_string(&mut text).map_err(unreadable)?;
-    if text.len() as u64 > LONGEST_SCENE_FILE {
-        return Err(Error::input(path, "longer than 1 MiB: this is no scene file"));
-    }
+    let text = input::text(path).map_err(unreadable)?;
     let text = Text::new(&path.display().to_string(), text, overrides)?;
     build(&text, path.parent().unwrap_or(Path::new("")), progress, admit)
 }
@@ -115,7 +106,17 @@ fn build(
     let section = file.volume.get_ref();
     // The path that a density of 1 makes one optical depth long.
     let mean_free_path = section.density.as_ref().map(|density| density.extinction.0.recip());
-    let volume = volume.load(&admit)?;
+    let resolves = |size| {
+        span::check(&shell, size).map_err(|too_fine| {
+            let mesh = file.mesh.get_ref().file.as_ref().map(|file| base_dir.join(file));
+            let error = match (text.span_of("shell", "uv_scale"), mesh) {
+                (None, Some(mesh)) => Error::input(mesh, too_fine.to_string()),
+                (span, _) => text.error(span.unwrap_or(file.mesh.span()), too_fine.to_string()),
+            };
+            error.with_help(span::TooFine::HELP)
+        })
+    };
+    let volume = volume.load(&admit, &resolves)?;
     let texel_along_w = options.thickness / f64::from(volume.size[2]);
     stopwatch.lap("load.volume");
 
@@ -212,12 +213,21 @@ impl VolumeSource {
         }
     }
 
-    fn load(self, admit: &dyn Fn([u32; 3]) -> Result<()>) -> Result<Volume> {
+    /// `admit` has been asked about a recipe's size; whether the shell `resolves` it has not.
+    fn load(
+        self,
+        admit: &dyn Fn([u32; 3]) -> Result<()>,
+        resolves: &dyn Fn([u32; 3]) -> Result<()>,
+    ) -> Result<Volume> {
         match self {
-            Self::Recipe(recipe) => recipe.build(),
+            Self::Recipe(recipe) => {
+                resolves(recipe.header().size)?;
+                recipe.build()
+            }
             Self::File(path, interpretation) => {
                 let raw = volume::read(&path)?;
                 admit(raw.size)?;
+                resolves(raw.size)?;
                 Volume::from_raw(raw, &interpretation)
             }
         }
@@ -310,7 +320,7 @@ recipe = "fog.toml"
     }
 
     /// What is replaced in [`SCENE`] by what, the spot that must be underlined, a part of the message.
-    const MISTAKES: &[[&str; 4]] = &[
+    const CHANGES: &[[&str; 4]] = &[
         ["segments", "segmens", "segmens", "unknown key `segmens`"],
         ["\"torus\"", "\"tours\"", "\"tours\"", "unknown name `tours`"],
         ["= 8", "= 2", "2", "`segments` is 2"],
@@ -330,53 +340,43 @@ recipe = "fog.toml"
         ["recipe =", "opacity_distance = 0\nrecipe =", "0", "greater than 0"],
         ["recipe =", "lod_footprint = -0.1\nrecipe =", "-0.1", "at least 0"],
         ["[volume]", "[volume", "", "unclosed table"],
-        ["[mesh]", "[image]\nsize = [0, 9]\n[mesh]", "0", "from 1 to 32768"],
-        ["[mesh]", "[image]\nsize = [9, 32769]\n[mesh]", "32769", "from 1 to 32768"],
-        ["[mesh]", "[image]\nsize = [32768, 32768]\n[mesh]", "[32768, 32768]", "2^28 pixels"],
-        ["[mesh]", "[image]\nbackground = [0, -1, 0]\n[mesh]", "-1", "at least 0"],
-        ["[mesh]", "[image]\nbackground = '#12345'\n[mesh]", "'#12345'", "a colour such as"],
-        ["[mesh]", "[image]\nbackground = [0, 1, 0, 1]\n[mesh]", "[0, 1, 0, 1]", "a list of 3"],
         [
             "\"fog.toml\"",
             "\"fog.toml\"\ntransfer.points = [{ value = 0, colour = 'red', alpha = 1 }]",
             "'red'",
             "a colour",
         ],
-        ["[mesh]", "[march]\nplan = 'papr'\n[mesh]", "'papr'", "`default`, `paper`, `exact`"],
-        ["[mesh]", "[march]\nsamples = 0\n[mesh]", "0", "from 1 to 4096"],
-        ["[mesh]", "[march]\nstep = 0\n[mesh]", "0", "from 0.001"],
-        ["[mesh]", "[camera]\neye = [0, 0, 1]\n[mesh]", "[camera]", "missing key `target`"],
-        [
-            "[mesh]",
-            "[camera]\neye = [1, 2, 3]\ntarget = [1, 2, 3.0]\n[mesh]",
-            "[1, 2, 3.0]",
-            "other than the eye",
-        ],
-        ["[mesh]", "[camera]\neye = [0, 2, 1]\ntarget = [0, 1, 1]\n[mesh]", "[0, 1, 1]", "line of sight"],
-        [
-            "[mesh]",
-            "[camera]\neye = [0, 0, 1]\ntarget = [0, 0, 0]\nup = [0, 0, 9]\n[mesh]",
-            "[0, 0, 9]",
-            "line of sight",
-        ],
-        [
-            "[mesh]",
-            "[camera]\neye = [0, 0, 1]\ntarget = [0, 0, 0]\nfov = 180\n[mesh]",
-            "180",
-            "between 0 and 180",
-        ],
-        ["[mesh]", "[camera]\neye = [0, 0, 1]\ntarget = [0, 0, 0]\nnear = 0\n[mesh]", "0", "greater than 0"],
+    ];
+
+    /// What is laid before [`SCENE`], the spot that must be underlined, a part of the message.
+    const ADDITIONS: &[[&str; 3]] = &[
+        ["[image]\nsize = [0, 9]", "0", "from 1 to 32768"],
+        ["[image]\nsize = [9, 32769]", "32769", "from 1 to 32768"],
+        ["[image]\nsize = [32768, 32768]", "[32768, 32768]", "2^28 pixels"],
+        ["[image]\nbackground = [0, -1, 0]", "-1", "at least 0"],
+        ["[image]\nbackground = '#12345'", "'#12345'", "a colour such as"],
+        ["[image]\nbackground = [0, 1, 0, 1]", "[0, 1, 0, 1]", "a list of 3"],
+        ["[march]\nplan = 'papr'", "'papr'", "`default`, `paper`, `exact`"],
+        ["[march]\nsamples = 0", "0", "from 1 to 4096"],
+        ["[march]\nstep = 0", "0", "from 0.001"],
+        ["[camera]\neye = [0, 0, 1]", "[camera]", "missing key `target`"],
+        ["[camera]\neye = [1, 2, 3]\ntarget = [1, 2, 3.0]", "[1, 2, 3.0]", "other than the eye"],
+        ["[camera]\neye = [0, 2, 1]\ntarget = [0, 1, 1]", "[0, 1, 1]", "line of sight"],
+        ["[camera]\neye = [0, 0, 1]\ntarget = [0, 0, 0]\nup = [0, 0, 9]", "[0, 0, 9]", "line of sight"],
+        ["[camera]\neye = [0, 0, 1]\ntarget = [0, 0, 0]\nfov = 180", "180", "between 0 and 180"],
+        ["[camera]\neye = [0, 0, 1]\ntarget = [0, 0, 0]\nnear = 0", "0", "greater than 0"],
     ];
 
     #[test]
     fn every_mistake_is_underlined() {
-        for [from, to, spot, part] in MISTAKES {
-            let text = SCENE.replacen(from, to, 1);
-            assert_ne!(text, SCENE, "{from}");
+        let changes = CHANGES.iter().map(|[from, to, spot, part]| (SCENE.replacen(from, to, 1), spot, part));
+        let additions = ADDITIONS.iter().map(|[added, spot, part]| (format!("{added}{SCENE}"), spot, part));
+        for (text, spot, part) in changes.chain(additions) {
+            assert_ne!(text, SCENE, "{part}");
             let error = parse("scene.toml", &text, folder().path()).map(drop).unwrap_err();
-            assert!(error.to_string().contains(part), "{to}: {error}");
-            let Error::Text { source_code, span, label, .. } = error else { panic!("{to}: {error}") };
-            assert_eq!(&source_code.inner()[span.offset()..span.offset() + span.len()], *spot, "{to}");
+            assert!(error.to_string().contains(part), "{text}: {error}");
+            let Error::Text { source_code, span, label, .. } = error else { panic!("{text}: {error}") };
+            assert_eq!(&source_code.inner()[span.offset()..span.offset() + span.len()], *spot, "{text}");
             assert!(!label.is_empty());
         }
     }
@@ -420,6 +420,26 @@ recipe = "fog.toml"
             Err(Error::Interrupted)
         };
         assert!(matches!(build(&text, folder.path(), &Silent, &refuse), Err(Error::Interrupted)));
+    }
+
+    #[test]
+    fn a_texture_too_fine_to_resolve_is_blamed_on_who_made_it() {
+        let folder = folder();
+        let told = |text: &str, overrides: &[String], parts: &[&str]| {
+            let text = Text::new("scene.toml", text.to_owned(), overrides).unwrap();
+            let error = build(&text, folder.path(), &Silent, &|_| Ok(())).map(drop).unwrap_err();
+            let report = format!("{:?}", miette::Report::new_boxed(Box::new(error)));
+            for part in parts.iter().chain(&["texels along u", "shell.uv_scale", "texture coordinates"]) {
+                assert!(report.contains(part), "{report}");
+            }
+        };
+        let scaled = SCENE.replace("0.1", "0.1\nuv_scale = [1e30, 1]");
+        told(&scaled, &[], &["[1e30, 1]", "1048576"]);
+        told(SCENE, &["shell.uv_scale=[1e30, 1]".to_owned()], &["-D shell.uv_scale", "1048576"]);
+        let mesh = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1e9 0\nvt 0 1\nf 1/1 2/2 3/3\n";
+        std::fs::write(folder.path().join("wild.obj"), mesh).unwrap();
+        let generator = "generator = \"torus\"\nsegments = 8\nrings = 4";
+        told(&SCENE.replace(generator, "file = 'wild.obj'"), &[], &["wild.obj", "triangle 0", "1048576"]);
     }
 
     #[test]

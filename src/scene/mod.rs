@@ -20,6 +20,7 @@
 pub mod camera;
 pub mod file;
 pub mod load;
+pub mod span;
 pub(crate) mod text;
 
 pub use camera::{Camera, View};

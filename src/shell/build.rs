@@ -92,7 +92,8 @@ impl Shell {
 
 impl ShellOptions {
     fn texture_uv(&self, uv: DVec2) -> DVec2 {
-        self.uv_scale * uv + self.uv_offset
+        // Whole turns of the offset change nothing, but would take digits from what is added.
+        self.uv_scale * uv + (self.uv_offset - self.uv_offset.floor())
     }
 }
 
@@ -168,18 +169,9 @@ fn validate(mesh: &Mesh, options: &ShellOptions) -> Result<()> {
 mod tests {
     use super::*;
 
-    fn triangle() -> Mesh {
-        Mesh {
-            positions: vec![DVec3::ZERO, DVec3::X, DVec3::Y],
-            normals: vec![DVec3::Z; 3],
-            triangles: vec![[0, 1, 2]],
-            uvs: vec![[DVec2::ZERO, DVec2::X, DVec2::Y]],
-        }
-    }
-
     /// Asserts that the options and the mesh, once spoiled, are refused as usage, in these words.
     fn assert_refused(words: &str, spoil: impl Fn(&mut ShellOptions, &mut Mesh)) {
-        let (mut options, mut mesh) = (ShellOptions::new(1.0), triangle());
+        let (mut options, mut mesh) = (ShellOptions::new(1.0), Mesh::triangle());
         Shell::build(&mesh, &options).expect("sound before it is spoiled");
         spoil(&mut options, &mut mesh);
         let error = Shell::build(&mesh, &options).expect_err(words);
@@ -245,16 +237,27 @@ mod tests {
             uv_offset: DVec2::splat(0.25),
             ..ShellOptions::new(1.0)
         };
-        let shell = Shell::build(&triangle(), &options).unwrap();
+        let shell = Shell::build(&Mesh::triangle(), &options).unwrap();
         let corner = |u, v| DVec3::new(u, v, 0.0);
         let expected = [corner(0.25, 0.25), corner(2.25, 0.25), corner(0.25, 4.25)];
         assert_eq!(shell.texture[0][..3], expected);
     }
 
     #[test]
+    fn a_far_offset_moves_the_texture_as_a_near_one() {
+        let texture = |offset: f64| {
+            let options = ShellOptions { uv_offset: DVec2::splat(offset), ..ShellOptions::new(1.0) };
+            Shell::build(&Mesh::triangle(), &options).unwrap().texture
+        };
+        assert_eq!(texture(1e9 + 0.25), texture(0.25));
+        assert_eq!(texture(-1e9 + 0.25), texture(0.25));
+        assert_eq!(texture(1e30), texture(0.0), "at 1e30 every number is whole");
+    }
+
+    #[test]
     fn the_scale_is_per_position() {
         let options = ShellOptions { thickness_scale: vec![0.0, 1.0, 2.0], ..ShellOptions::new(0.5) };
-        let shell = Shell::build(&triangle(), &options).unwrap();
+        let shell = Shell::build(&Mesh::triangle(), &options).unwrap();
         assert_eq!([3, 4, 5].map(|id| shell.vertices[id].z), [0.0, 0.5, 1.0]);
     }
 }

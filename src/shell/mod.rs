@@ -76,7 +76,7 @@ pub struct ShellOptions {
     pub thickness_scale: Vec<f64>,
     /// Rounds of neighbourhood averaging applied to the extrusion directions.
     pub smoothing_rounds: u32,
-    /// Texture coordinates are `uv_scale * uv + uv_offset`.
+    /// Texture coordinates are `uv_scale * uv + uv_offset`, modulo 1.
     pub uv_scale: DVec2,
     /// See `uv_scale`.
     pub uv_offset: DVec2,

@@ -3,8 +3,6 @@
 
 use std::path::Path;
 
-use glam::{DVec2, DVec3};
-
 use super::{Case, Stand};
 use crate::Result;
 use crate::mesh::Mesh;
@@ -29,7 +27,7 @@ fn thickness(_: &Stand<'_>) -> Result<f64> {
         let loaded = scene::parse("scene.toml", &text, Path::new(""));
         accepted += usize::from(!is_told(loaded, "thickness"));
     }
-    let mesh = triangle();
+    let mesh = Mesh::triangle();
     for value in [0.0, -0.0, 5e-324, 1e-310, -1e-310, -0.2, f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
         accepted += usize::from(!is_told(Shell::build(&mesh, &ShellOptions::new(value)), "shell.thickness"));
     }
@@ -63,22 +61,13 @@ fn normals(_: &Stand<'_>) -> Result<f64> {
             (|mesh, value| mesh.uvs[0][1].x = value, "triangle 0"),
         ];
         for (spoil, place) in spoils {
-            let mut mesh = triangle();
+            let mut mesh = Mesh::triangle();
             spoil(&mut mesh, value);
             let told = mesh.validate().is_err_and(|message| message.contains(place));
             accepted += usize::from(!(told && is_told(Shell::build(&mesh, &ShellOptions::new(0.1)), place)));
         }
     }
     Ok(accepted as f64)
-}
-
-fn triangle() -> Mesh {
-    Mesh {
-        positions: vec![DVec3::ZERO, DVec3::X, DVec3::Y],
-        normals: vec![DVec3::Z; 3],
-        triangles: vec![[0, 1, 2]],
-        uvs: vec![[DVec2::ZERO, DVec2::X, DVec2::Y]],
-    }
 }
 
 /// Whether the result is an error that says `word`, in its message or on the line that it underlines.

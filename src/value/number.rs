@@ -6,6 +6,25 @@ use serde::de::{Deserializer, Error, Unexpected, Visitor};
 
 use super::Exactly;
 
+/// Reads a number by a visitor with the methods given; `$expecting` says the range in words.
+macro_rules! read {
+    ($name:ident as $kind:ident = $expecting:expr; $($visit:item)*) => {
+        impl<'de> Deserialize<'de> for $name {
+            fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+                struct InRange;
+                impl Visitor<'_> for InRange {
+                    type Value = $name;
+                    fn expecting(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                        formatter.write_fmt($expecting)
+                    }
+                    $($visit)*
+                }
+                deserializer.$kind(InRange)
+            }
+        }
+    };
+}
+
 /// Declares a number whose range is checked as it is read; the second line says the range in words.
 macro_rules! number {
     ($(#[$doc:meta])* $name:ident = $expecting:literal, $in_range:expr) => {
@@ -13,27 +32,18 @@ macro_rules! number {
         #[derive(Debug, Clone, Copy, PartialEq)]
         pub struct $name(pub f64);
 
-        impl<'de> Deserialize<'de> for $name {
-            fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-                struct InRange;
-                impl Visitor<'_> for InRange {
-                    type Value = $name;
-                    fn expecting(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-                        formatter.write_str($expecting)
-                    }
-                    fn visit_f64<E: Error>(self, value: f64) -> Result<$name, E> {
-                        let in_range: fn(f64) -> bool = $in_range;
-                        if value.is_finite() && in_range(value) {
-                            Ok($name(value))
-                        } else {
-                            Err(E::invalid_value(Unexpected::Float(value), &self))
-                        }
-                    }
-                    fn visit_i64<E: Error>(self, value: i64) -> Result<$name, E> {
-                        self.visit_f64(value as f64)
-                    }
+        read! {
+            $name as deserialize_f64 = format_args!($expecting);
+            fn visit_f64<E: Error>(self, value: f64) -> Result<$name, E> {
+                let in_range: fn(f64) -> bool = $in_range;
+                if value.is_finite() && in_range(value) {
+                    Ok($name(value))
+                } else {
+                    Err(E::invalid_value(Unexpected::Float(value), &self))
                 }
-                deserializer.deserialize_f64(InRange)
+            }
+            fn visit_i64<E: Error>(self, value: i64) -> Result<$name, E> {
+                self.visit_f64(value as f64)
             }
         }
     };
@@ -46,22 +56,13 @@ macro_rules! count {
         #[derive(Debug, Clone, Copy, PartialEq, Eq)]
         pub struct $name(pub u32);
 
-        impl<'de> Deserialize<'de> for $name {
-            fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-                struct InRange;
-                impl Visitor<'_> for InRange {
-                    type Value = $name;
-                    fn expecting(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-                        write!(formatter, "a whole number from {} to {}", $least, $most)
-                    }
-                    fn visit_i64<E: Error>(self, value: i64) -> Result<$name, E> {
-                        match u32::try_from(value) {
-                            Ok(count) if ($least..=$most).contains(&count) => Ok($name(count)),
-                            _ => Err(E::invalid_value(Unexpected::Signed(value), &self)),
-                        }
-                    }
+        read! {
+            $name as deserialize_u32 = format_args!("a whole number from {} to {}", $least, $most);
+            fn visit_i64<E: Error>(self, value: i64) -> Result<$name, E> {
+                match u32::try_from(value) {
+                    Ok(count) if ($least..=$most).contains(&count) => Ok($name(count)),
+                    _ => Err(E::invalid_value(Unexpected::Signed(value), &self)),
                 }
-                deserializer.deserialize_u32(InRange)
             }
         }
     };

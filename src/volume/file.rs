@@ -1,10 +1,9 @@
 //! Volume files of any supported kind.
 
-use std::fs::File;
 use std::io::Read as _;
 use std::path::Path;
 
-use super::raw::unreadable;
+use super::raw::{open, unreadable};
 use super::{AlphaMode, RawVolume, Volume, VolumeInfo, ktx2_file, nrrd, recipe, stack};
 use crate::{Error, Result};
 
@@ -21,9 +20,8 @@ pub fn read(path: &Path) -> Result<RawVolume> {
         return stack::read(path);
     }
     let mut magic = Vec::new();
-    File::open(path)
-        .and_then(|file| file.take(ktx2::MAGIC.len() as u64).read_to_end(&mut magic))
-        .map_err(|error| unreadable(path, &error))?;
+    let (file, _) = open(path)?;
+    file.take(ktx2::MAGIC.len() as u64).read_to_end(&mut magic).map_err(|error| unreadable(path, &error))?;
     if magic == ktx2::MAGIC {
         ktx2_file::read(path)
     } else if magic.starts_with(nrrd::MAGIC) {

@@ -3,23 +3,24 @@
 //! Read are level 0 of the 3D formats that [`Sample`] lists, as they are or compressed with zlib. The
 //! axes are taken as stored: texel (0, 0, 0) comes first, and x, y, z become u, v, w.
 
-use std::io::{Read as _, Write as _};
+use std::fs::File;
+use std::io::{Read as _, Seek as _, SeekFrom, Take, Write as _};
 use std::path::Path;
 
 use flate2::read::ZlibDecoder;
 use ktx2::dfd::{Basic, Block};
 use ktx2::{Header, Index, LevelIndex, SupercompressionScheme};
 
-use super::raw::{check_fits_memory, claimed_size, file_bytes};
-use super::{AlphaMode, MAX_DEFLATE_RATIO, RawVolume, Sample, Volume};
+use super::raw::{check_fits_memory, claimed_size, open, unreadable};
+use super::{AlphaMode, RawVolume, Sample, Volume};
+use crate::input::MAX_DEFLATE_RATIO;
 use crate::{Error, Result, output};
 
 /// Reads level 0 of the 3D texture at `path`.
 pub(super) fn read(path: &Path) -> Result<RawVolume> {
-    let bytes = file_bytes(path)?;
-    let short = || Error::input(path, format!("ends early: it has only {} bytes", bytes.len()));
-    let header = bytes.first_chunk::<{ Header::LENGTH }>().ok_or_else(short)?;
-    let header = Header::from_bytes(header).map_err(|error| Error::input(path, format!("has {error}")))?;
+    let mut file = Pieces::of(path)?;
+    let header =
+        Header::from_bytes(&file.bytes(0)?).map_err(|error| Error::input(path, format!("has {error}")))?;
     let Header { pixel_width, pixel_height, pixel_depth, .. } = header;
     if pixel_depth == 0 || header.layer_count > 1 || header.face_count != 1 {
         return Err(Error::input(path, "is no 3D texture: its pixelDepth is 0, or it has layers or faces"));
@@ -32,64 +33,89 @@ pub(super) fn read(path: &Path) -> Result<RawVolume> {
     })?;
     let size = [pixel_width, pixel_height, pixel_depth].map(u64::from);
     let (size, count) = claimed_size(path, size, channels)?;
-    let stored = level_0(&bytes).ok_or_else(short)?;
+    let level = LevelIndex::from_bytes(&file.bytes(Header::LENGTH as u64)?);
+    let mut stored = file.piece(level.byte_offset, level.byte_length)?;
     let byte_count = count * sample.bytes();
-    let wrong_length = |found: usize| {
+    let wrong_length = |found: u64| {
         let [width, height, depth] = size;
         let message = format!(
             "level 0 of {width} x {height} x {depth} texels takes {byte_count} bytes, but has {found}"
         );
         Error::input(path, message)
     };
-    let values = match header.supercompression_scheme {
-        None if stored.len() == byte_count => {
+    let mut texels = Vec::new();
+    match header.supercompression_scheme {
+        None if level.byte_length == byte_count as u64 => {
             check_fits_memory(path, size)?;
-            sample.decode(stored, channels)
+            stored.read_to_end(&mut texels).map_err(|error| unreadable(path, &error))?;
         }
-        None => return Err(wrong_length(stored.len())),
+        None => return Err(wrong_length(level.byte_length)),
         Some(SupercompressionScheme::ZLIB) => {
-            if byte_count / MAX_DEFLATE_RATIO > stored.len() {
-                return Err(wrong_length(stored.len()));
+            if byte_count as u64 / MAX_DEFLATE_RATIO > level.byte_length {
+                return Err(wrong_length(level.byte_length));
             }
             check_fits_memory(path, size)?;
-            let mut inflated = Vec::new();
             ZlibDecoder::new(stored)
                 .take(byte_count as u64 + 1)
-                .read_to_end(&mut inflated)
+                .read_to_end(&mut texels)
                 .map_err(|error| Error::input(path, format!("its zlib data is damaged: {error}")))?;
-            if inflated.len() != byte_count {
-                return Err(wrong_length(inflated.len()));
+            if texels.len() != byte_count {
+                return Err(wrong_length(texels.len() as u64));
             }
-            sample.decode(&inflated, channels)
         }
         Some(scheme) => {
             let error =
                 Error::input(path, format!("is supercompressed by {scheme:?}, which is not supported"));
             return Err(error.with_help("store it without supercompression, or with zlib"));
         }
-    };
+    }
+    let values = sample.decode(&texels, channels);
     let format = format!("KTX2 {:?}", sample.format(channels));
-    let alpha_mode =
-        if is_premultiplied(&bytes, &header.index) { AlphaMode::Premultiplied } else { AlphaMode::Straight };
+    let alpha_mode = if is_premultiplied(&mut file, &header.index) {
+        AlphaMode::Premultiplied
+    } else {
+        AlphaMode::Straight
+    };
     RawVolume { path: path.into(), format, size, channels, values, full_scale: 1.0, alpha_mode }.validated()
 }
 
-/// The stored bytes of level 0; `None` where they lie beyond the end.
-fn level_0(bytes: &[u8]) -> Option<&[u8]> {
-    let index = bytes.get(Header::LENGTH..)?.first_chunk::<{ LevelIndex::LENGTH }>()?;
-    let level = LevelIndex::from_bytes(index);
-    let start = usize::try_from(level.byte_offset).ok()?;
-    let end = start.checked_add(usize::try_from(level.byte_length).ok()?)?;
-    bytes.get(start..end)
+/// A file of which no more is read than is asked for, and that only once it is known to be there.
+struct Pieces<'a> {
+    path: &'a Path,
+    file: File,
+    length: u64,
 }
 
-/// Whether the data format descriptor has the flag `KHR_DF_FLAG_ALPHA_PREMULTIPLIED`.
+impl<'a> Pieces<'a> {
+    fn of(path: &'a Path) -> Result<Self> {
+        let (file, length) = open(path)?;
+        Ok(Self { path, file, length })
+    }
+
+    /// So many bytes from `start` on, to be read.
+    fn piece(&mut self, start: u64, length: u64) -> Result<Take<&File>> {
+        if start.checked_add(length).is_none_or(|end| end > self.length) {
+            let message = format!("ends early: it has only {} bytes", self.length);
+            return Err(Error::input(self.path, message));
+        }
+        self.file.seek(SeekFrom::Start(start)).map_err(|error| unreadable(self.path, &error))?;
+        Ok((&self.file).take(length))
+    }
+
+    fn bytes<const N: usize>(&mut self, start: u64) -> Result<[u8; N]> {
+        let mut bytes = [0; N];
+        let read = self.piece(start, N as u64)?.read_exact(&mut bytes);
+        read.map_err(|error| unreadable(self.path, &error)).map(|()| bytes)
+    }
+}
+
+/// Whether the data format descriptor has the flag `KHR_DF_FLAG_ALPHA_PREMULTIPLIED`; not where it lies beyond the end.
 ///
 /// Its byte is read in place: `ktx2` 0.5 panics at a descriptor with texel blocks of 256 texels.
-fn is_premultiplied(bytes: &[u8], index: &Index) -> bool {
-    const FLAGS: usize = size_of::<u32>() + ktx2::dfd::BlockHeader::LENGTH + 3;
-    let flags = bytes.get((index.dfd_byte_offset as usize).saturating_add(FLAGS));
-    index.dfd_byte_length as usize > FLAGS && flags.is_some_and(|flags| flags & 1 == 1)
+fn is_premultiplied(file: &mut Pieces<'_>, index: &Index) -> bool {
+    const FLAGS: u32 = (size_of::<u32>() + ktx2::dfd::BlockHeader::LENGTH + 3) as u32;
+    let flags = file.bytes(u64::from(index.dfd_byte_offset) + u64::from(FLAGS));
+    index.dfd_byte_length > FLAGS && flags.is_ok_and(|[flags]| flags & 1 == 1)
 }
 
 /// Writes `volume` as premultiplied R32G32B32A32_SFLOAT; it is read back bit for bit.

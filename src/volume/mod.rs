@@ -18,9 +18,6 @@ pub use raw::{AlphaMode, ChannelRange, RawVolume, VolumeInfo};
 pub use sample::Sample;
 pub use transfer::{ControlPoint, InvalidTransferFunction, TransferFunction};
 
-/// DEFLATE turns no byte into more than 1032 (a match of 258 bytes takes at least two bits).
-const MAX_DEFLATE_RATIO: usize = 1032;
-
 /// What the fourth channel of a [`Volume`] holds. It is interpolated as such.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
 pub enum Quantity {

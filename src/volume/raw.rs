@@ -1,11 +1,12 @@
 //! What a volume file holds, before it means colour and opacity.
 
+use std::fs::File;
 use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
 use super::{texel_at, texel_count};
-use crate::{Error, Result};
+use crate::{Error, Result, input};
 
 /// The most texels that a file may have: 4 GiB as RGBA in f32. A few kilobytes of compressed zeros can
 /// claim, and honestly hold, far more than any machine has.
@@ -142,9 +143,9 @@ pub(super) fn check_fits_memory(path: &Path, size: [u32; 3]) -> Result<()> {
     Err(Error::OutOfMemory { message, help: Some("downsample the volume or cut a part out of it".into()) })
 }
 
-/// The whole of a file.
-pub(super) fn file_bytes(path: &Path) -> Result<Vec<u8>> {
-    std::fs::read(path).map_err(|error| unreadable(path, &error))
+/// A regular file, open for reading, and its length in bytes.
+pub(super) fn open(path: &Path) -> Result<(File, u64)> {
+    input::open(path).map_err(|error| unreadable(path, &error))
 }
 
 /// The system would not let a file be read.

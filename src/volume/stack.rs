@@ -5,15 +5,15 @@
 
 use std::cmp::Ordering;
 use std::ffi::OsStr;
-use std::fs::File;
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
 use image::{ColorType, DynamicImage, ImageDecoder, ImageFormat, ImageReader};
 
-use super::raw::{check_fits_memory, claimed_size, unreadable};
-use super::{AlphaMode, MAX_DEFLATE_RATIO, RawVolume};
+use super::raw::{check_fits_memory, claimed_size, open, unreadable};
+use super::{AlphaMode, RawVolume};
 use crate::frame::srgb::linear_from_srgb;
+use crate::input::MAX_DEFLATE_RATIO;
 use crate::{Error, Result};
 
 /// Whether `path` stands for several files: its last part has `*` or `?`, and no file has that very name.
@@ -70,13 +70,12 @@ fn undecodable(path: &Path, error: &image::ImageError) -> Error {
 
 /// A decoder that has read the header of the PNG at `path` and found its size plausible.
 fn decoder(path: &Path) -> Result<impl ImageDecoder> {
-    let file = File::open(path).map_err(|error| unreadable(path, &error))?;
-    let length = file.metadata().map_err(|error| unreadable(path, &error))?.len();
+    let (file, length) = open(path)?;
     let decoder = ImageReader::with_format(BufReader::new(file), ImageFormat::Png)
         .into_decoder()
         .map_err(|error| undecodable(path, &error))?;
     // Pixels of one bit grow to a byte.
-    if decoder.total_bytes() / (8 * MAX_DEFLATE_RATIO as u64) > length {
+    if decoder.total_bytes() / (8 * MAX_DEFLATE_RATIO) > length {
         let (width, height) = decoder.dimensions();
         let message = format!("claims {width} x {height} pixels, more than its {length} bytes can hold");
         return Err(Error::input(path, message));

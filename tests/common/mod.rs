@@ -19,16 +19,9 @@ pub struct Watched {
 impl Watched {
     pub fn prepare(name: &str, scene: &Arc<Scene>) -> Self {
         let messages = Messages::default();
-        let progress: Arc<dyn Progress> = Arc::new(Silent);
-        let setup = Setup {
-            device: &DeviceChoice::Any,
-            validation: Some(&messages),
-            progress: &progress,
-            interrupt: &Interrupt::default(),
-        };
         let entry = method::by_name(name).expect("a known method");
-        let method =
-            entry.prepare(scene.clone(), &setup).unwrap_or_else(|error| panic!("{error}\n{error:?}"));
+        let method = set_up(&messages, |setup| entry.prepare(scene.clone(), &setup))
+            .unwrap_or_else(|error| panic!("{error}\n{error:?}"));
         Self { method: Some(method), messages }
     }
 
@@ -46,4 +39,15 @@ impl Drop for Watched {
             assert!(messages.is_empty(), "the validation layers said:\n{}", messages.join("\n"));
         }
     }
+}
+
+/// Runs something on any device, silently, while the validation layers write down `messages`.
+pub fn set_up<T>(messages: &Messages, run: impl FnOnce(Setup<'_>) -> T) -> T {
+    let progress: Arc<dyn Progress> = Arc::new(Silent);
+    run(Setup {
+        device: &DeviceChoice::Any,
+        validation: Some(messages),
+        progress: &progress,
+        interrupt: &Interrupt::default(),
+    })
 }

@@ -19,7 +19,10 @@ use glam::{DVec2, DVec3};
 
 use super::weld::weld;
 use super::{Mesh, Projection, normals};
-use crate::{Error, Result};
+use crate::{Error, Result, input};
+
+/// In bytes: some twenty million triangles, far more than a device draws.
+const LONGEST_FILE: u64 = 1 << 31;
 
 /// A mesh as it came from a file.
 #[derive(Debug, Clone, PartialEq)]
@@ -49,8 +52,8 @@ pub fn load(path: impl AsRef<Path>, projection: Option<&Projection>) -> Result<M
 /// As [`load`].
 pub fn load_counted(path: impl AsRef<Path>, projection: Option<&Projection>) -> Result<Loaded> {
     let path = path.as_ref();
-    let bytes =
-        std::fs::read(path).map_err(|error| Error::input(path, format!("cannot be read: {error}")))?;
+    let bytes = input::bytes(path, LONGEST_FILE)
+        .map_err(|error| Error::input(path, format!("cannot be read: {error}")))?;
     // Only names and comments hold anything but ASCII, and they are not read.
     parse(path, &String::from_utf8_lossy(&bytes), projection)
 }

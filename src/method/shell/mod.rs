@@ -17,13 +17,13 @@ use bytemuck::{Pod, Zeroable};
 
 use self::seen::{Run, Seen};
 use super::{Method, Setup};
-use crate::Result;
 use crate::frame::{Frame, Image, Report, Stopwatch};
 use crate::gpu::{Batch, Buffer, Draw, Gpu, Pipeline, PipelineInfo, Target, Texture3d, draw, shaders};
 use crate::order::{Sorted, Sorter};
 use crate::progress::{Interrupt, Progress};
-use crate::scene::{March, Scene, Sizes, View};
+use crate::scene::{March, Scene, Sizes, View, span};
 use crate::volume::Quantity;
+use crate::{Error, Result};
 
 /// The push constants of `glsl/include/shell.glsl`: see there for each member.
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
@@ -49,6 +49,8 @@ struct Shell {
     interrupt: Interrupt,
     sorter: Sorter,
     volume: Texture3d,
+    /// The most that a ray passes in one tetrahedron.
+    texels: f64,
     // What a frame of one size and kind needs, kept for the next frame.
     canvas: Option<Canvas>,
 }
@@ -95,7 +97,7 @@ struct Opened {
 /// Opens the device.
 ///
 /// # Errors
-/// [`Error::Device`](crate::Error::Device) where there is none.
+/// [`Error::Device`] where there is none.
 pub fn open(setup: &Setup<'_>) -> Result<Box<dyn super::Opened>> {
     setup.progress.stage("opening the device");
     let gpu = Gpu::open(setup.device, setup.validation)?;
@@ -109,10 +111,16 @@ impl super::Opened for Opened {
 
     fn prepare(self: Box<Self>, scene: Arc<Scene>) -> Result<Box<dyn Method>> {
         let Self { gpu, progress, interrupt } = *self;
+        let size = scene.volume.levels[0].size;
+        span::check(&scene.shell, size).map_err(|too_fine| Error::Usage {
+            message: too_fine.to_string(),
+            help: Some(span::TooFine::HELP.into()),
+        })?;
+        let texels = span::longest(&scene.shell, size);
         progress.stage("uploading the volume");
         let volume = Texture3d::upload(&gpu, "the volume", &scene.volume)?;
         let sorter = Sorter::new(&scene.shell.topology);
-        Ok(Box::new(Shell { scene, gpu, progress, interrupt, sorter, volume, canvas: None }))
+        Ok(Box::new(Shell { scene, gpu, progress, interrupt, sorter, volume, texels, canvas: None }))
     }
 }
 
@@ -262,7 +270,29 @@ impl Shell {
                 health.inverted, health.tetrahedra
             ));
         }
+        let wanted = wanted_samples(self.scene.march, self.texels);
+        if wanted > MOST_SAMPLES {
+            report.warnings.push(format!(
+                "a ray may pass {:.0} texels in one tetrahedron, and want {wanted:.0} samples there; it takes at most \
+                 {MOST_SAMPLES}, so that what is seen there may be coarse or cut short: make shell.uv_scale smaller",
+                self.texels
+            ));
+        }
         report
+    }
+}
+
+/// Samples that a ray takes in one tetrahedron at most: a bound of `sample_count` in `glsl/include/sample.glsl`, and of lavapipe,
+/// which ends all loops of a pixel there.
+const MOST_SAMPLES: f64 = 65535.0;
+
+/// How many samples the plan wants along a ray that passes so many texels of the full volume in a tetrahedron, at most.
+fn wanted_samples(march: March, texels: f64) -> f64 {
+    match march {
+        March::Default { step } => texels / step,
+        March::Paper { samples } => f64::from(samples),
+        // A ray passes planes of texels on three axes.
+        March::Exact => 3.0 * texels,
     }
 }
 
@@ -297,5 +327,16 @@ fn constants(scene: &Scene, view: &View, unit: f64) -> ViewConstants {
         per_opacity_distance: (unit / scene.medium.opacity_distance) as f32,
         step: step as f32,
         samples,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn host_and_shader_agree_on_the_most_samples() {
+        let shader = include_str!("../../../glsl/include/sample.glsl");
+        assert!(shader.contains(&format!("clamp(ceil(texels / view.step), 1.0, {MOST_SAMPLES:.1})")));
     }
 }

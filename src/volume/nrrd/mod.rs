@@ -7,24 +7,36 @@
 
 mod header;
 
-use std::borrow::Cow;
-use std::io::Read as _;
+use std::cmp::Ordering;
+use std::io::{self, BufRead, BufReader, Read, Seek as _, SeekFrom};
 use std::path::Path;
 
 use flate2::read::MultiGzDecoder;
 
-use super::raw::{check_fits_memory, claimed_size, file_bytes};
-use super::{AlphaMode, MAX_DEFLATE_RATIO, RawVolume};
+use super::raw::{check_fits_memory, claimed_size, open, unreadable};
+use super::{AlphaMode, RawVolume};
+use crate::input::MAX_DEFLATE_RATIO;
 use crate::{Error, Result};
-use header::{Encoding, Header, Number};
+use header::{Encoding, Header};
 
 /// How every NRRD file begins; the version follows.
 pub(super) const MAGIC: &[u8] = b"NRRD000";
 
+/// In bytes.
+const LONGEST_HEADER: u64 = 1 << 20;
+
+/// In bytes: the smallest f64, written out, has some 1100.
+const LONGEST_NUMBER: usize = 2000;
+
 /// Reads the volume whose header is at `path`.
 pub(super) fn read(path: &Path) -> Result<RawVolume> {
-    let bytes = file_bytes(path)?;
-    let (header, data_start) = Header::parse(path, &bytes)?;
+    let (mut file, mut length) = open(path)?;
+    let mut start = Vec::new();
+    (&mut file).take(LONGEST_HEADER + 1).read_to_end(&mut start).map_err(|error| unreadable(path, &error))?;
+    let (header, data_start) = Header::parse(path, &start)?;
+    if data_start as u64 > LONGEST_HEADER {
+        return Err(Error::input(path, format!("its header is longer than {} KiB", LONGEST_HEADER >> 10)));
+    }
     let (channels, sizes) = match header.sizes[..] {
         [width, height, depth] => (1, [width, height, depth]),
         [channels @ 1..=4, width, height, depth] => (channels as u32, [width, height, depth]),
@@ -39,33 +51,70 @@ pub(super) fn read(path: &Path) -> Result<RawVolume> {
 
     // Errors from here on are those of the file that has the data.
     let detached = header.data_file.as_ref().map(|name| path.parent().unwrap_or(Path::new("")).join(name));
-    let (data_path, data) = match &detached {
-        Some(data_path) => (data_path.as_path(), Cow::Owned(file_bytes(data_path)?)),
-        None => (path, Cow::Borrowed(&bytes[data_start..])),
+    let data_path = detached.as_deref().unwrap_or(path);
+    let unreadable = |error| unreadable(data_path, &error);
+    let mut skipped = data_start as u64;
+    if detached.is_some() {
+        let advice = || format!("it is the `data file` that {} names", path.display());
+        (file, length) = open(data_path).map_err(|error| error.with_help(advice()))?;
+        skipped = 0;
+    }
+    let mut data = BufReader::new(file);
+    data.seek(SeekFrom::Start(skipped)).map_err(unreadable)?;
+    for _ in 0..header.line_skip {
+        let lines = data.skip_until(b'\n').and_then(|_| data.fill_buf());
+        if lines.map_err(unreadable)?.is_empty() {
+            let message = format!("has nothing after the {} lines to skip", header.line_skip);
+            return Err(Error::input(data_path, message));
+        }
+    }
+    let left = length.saturating_sub(data.stream_position().map_err(unreadable)?);
+    let promised = count * header.number.bytes();
+    let wrong_length = |comparison: &str| {
+        let message = format!(
+            "has {comparison} than the {promised} bytes of {count} {} values that its header promises",
+            header.number.name()
+        );
+        Error::input(data_path, message)
     };
-    let data = after_lines(&data, header.line_skip).ok_or_else(|| {
-        Error::input(data_path, format!("has fewer than the {} lines to skip", header.line_skip))
-    })?;
     let values = match header.encoding {
         Encoding::Raw => {
-            let data = raw_data(data_path, data, &header, count)?;
-            check_fits_memory(path, size)?;
-            header.number.decode(data, header.little_endian)
-        }
-        Encoding::Gzip => {
-            let plausible = count * header.number.bytes() / MAX_DEFLATE_RATIO <= data.len();
-            if !plausible {
-                return Err(wrong_length(data_path, &header.number, count, "fewer"));
+            // Without a skip the data is what comes last.
+            let skip = header.byte_skip.unwrap_or(left.saturating_sub(promised as u64));
+            match left.saturating_sub(skip).cmp(&(promised as u64)) {
+                Ordering::Less => return Err(wrong_length("fewer")),
+                Ordering::Greater => return Err(wrong_length("more")),
+                Ordering::Equal => {}
             }
             check_fits_memory(path, size)?;
-            let data = inflated(data_path, data, &header, count)?;
-            header.number.decode(&data, header.little_endian)
+            let skip = i64::try_from(skip).expect("less than the file's length");
+            data.seek_relative(skip).map_err(unreadable)?;
+            let mut bytes = Vec::new();
+            data.take(promised as u64).read_to_end(&mut bytes).map_err(unreadable)?;
+            header.number.decode(&bytes, header.little_endian)
+        }
+        Encoding::Gzip => {
+            if promised as u64 / MAX_DEFLATE_RATIO > left {
+                return Err(wrong_length("fewer"));
+            }
+            check_fits_memory(path, size)?;
+            let bytes = inflated(data, header.byte_skip.unwrap_or(0), promised)
+                .map_err(|error| Error::input(data_path, format!("its gzip data is damaged: {error}")))?;
+            match bytes.len().cmp(&promised) {
+                Ordering::Less => return Err(wrong_length("fewer")),
+                Ordering::Greater => return Err(wrong_length("more")),
+                Ordering::Equal => header.number.decode(&bytes, header.little_endian),
+            }
         }
         Encoding::Text => {
-            let start = bytes_to_skip(&header).unwrap_or_default();
-            let values = text_values(data_path, data.get(start..).unwrap_or_default(), count)?;
-            check_fits_memory(path, size)?;
-            values
+            // A value takes a digit, and a separator before the next: where bytes lack, so will values.
+            if left.div_ceil(2) >= count as u64 {
+                check_fits_memory(path, size)?;
+            }
+            let skip =
+                i64::try_from(header.byte_skip.unwrap_or(0).min(left)).expect("at most the file's length");
+            data.seek_relative(skip).map_err(unreadable)?;
+            text_values(data_path, data, count)?
         }
     };
     let format = format!("NRRD {} {}", header.number.name(), header.encoding.name());
@@ -82,69 +131,49 @@ pub(super) fn read(path: &Path) -> Result<RawVolume> {
     volume.validated()
 }
 
-/// What follows the first `count` lines.
-fn after_lines(mut data: &[u8], count: usize) -> Option<&[u8]> {
-    for _ in 0..count {
-        let end = data.iter().position(|&byte| byte == b'\n')?;
-        data = &data[end + 1..];
-    }
-    Some(data)
-}
-
-fn wrong_length(path: &Path, number: &Number, count: usize, comparison: &str) -> Error {
-    let message = format!(
-        "has {comparison} than the {} bytes of {count} {} values that its header promises",
-        count * number.bytes(),
-        number.name()
-    );
-    Error::input(path, message)
-}
-
-/// The byte skip where there is one; more than any file has if it is more than memory could have.
-fn bytes_to_skip(header: &Header) -> Option<usize> {
-    header.byte_skip.map(|skip| usize::try_from(skip).unwrap_or(usize::MAX))
-}
-
-/// Exactly `count` values after the byte skip, or else at the end.
-fn raw_data<'a>(path: &Path, data: &'a [u8], header: &Header, count: usize) -> Result<&'a [u8]> {
-    let length = count * header.number.bytes();
-    let start = bytes_to_skip(header).unwrap_or(data.len().saturating_sub(length));
-    match data.get(start..) {
-        Some(data) if data.len() == length => Ok(data),
-        Some(data) if data.len() > length => Err(wrong_length(path, &header.number, count, "more")),
-        _ => Err(wrong_length(path, &header.number, count, "fewer")),
-    }
-}
-
-/// Exactly `count` values after the byte skip of the inflated stream, of which no more is inflated.
-fn inflated(path: &Path, data: &[u8], header: &Header, count: usize) -> Result<Vec<u8>> {
-    let damaged = |error| Error::input(path, format!("its gzip data is damaged: {error}"));
+/// What follows the first `skip` bytes of the inflated stream: of `length` bytes, or one more where there are more. No more than
+/// that is inflated.
+fn inflated(data: impl Read, skip: u64, length: usize) -> io::Result<Vec<u8>> {
     let mut stream = MultiGzDecoder::new(data);
-    std::io::copy(&mut stream.by_ref().take(header.byte_skip.unwrap_or(0)), &mut std::io::sink())
-        .map_err(damaged)?;
-    let length = count * header.number.bytes();
+    io::copy(&mut stream.by_ref().take(skip), &mut io::sink())?;
     let mut inflated = Vec::new();
-    stream.take(length as u64 + 1).read_to_end(&mut inflated).map_err(damaged)?;
-    match inflated.len().cmp(&length) {
-        std::cmp::Ordering::Equal => Ok(inflated),
-        std::cmp::Ordering::Less => Err(wrong_length(path, &header.number, count, "fewer")),
-        std::cmp::Ordering::Greater => Err(wrong_length(path, &header.number, count, "more")),
-    }
+    stream.take(length as u64 + 1).read_to_end(&mut inflated)?;
+    Ok(inflated)
 }
 
-/// Exactly `count` numbers in text, separated by white space or commas.
-fn text_values(path: &Path, data: &[u8], count: usize) -> Result<Vec<f32>> {
-    let text = std::str::from_utf8(data).map_err(|_| Error::input(path, "its data is not text"))?;
-    let mut words = text.split(|c: char| c.is_ascii_whitespace() || c == ',').filter(|word| !word.is_empty());
+/// Exactly `count` numbers in text, separated by white space or commas. Nothing is read beyond the first word too many.
+fn text_values(path: &Path, data: impl BufRead, count: usize) -> Result<Vec<f32>> {
+    let mut bytes = data.bytes();
+    let mut words = std::iter::from_fn(|| {
+        let mut word = Vec::new();
+        for byte in bytes.by_ref() {
+            match byte {
+                Err(error) => return Some(Err(unreadable(path, &error))),
+                Ok(byte) if !byte.is_ascii_whitespace() && byte != b',' => word.push(byte),
+                Ok(_) if word.is_empty() => {}
+                Ok(_) => break,
+            }
+            if word.len() > LONGEST_NUMBER {
+                return Some(Err(Error::input(
+                    path,
+                    format!("has a word of more than {LONGEST_NUMBER} bytes"),
+                )));
+            }
+        }
+        (!word.is_empty()).then(|| Ok(String::from_utf8_lossy(&word).into_owned()))
+    });
     let mut values = Vec::new();
     for word in words.by_ref().take(count) {
+        let word = word?;
         let value =
             word.parse::<f64>().map_err(|_| Error::input(path, format!("`{word}` is not a number")))?;
         values.push(value as f32);
     }
     match (values.len() == count, words.next()) {
         (true, None) => Ok(values),
-        (true, Some(_)) => Err(Error::input(path, format!("has more than {count} values"))),
+        (true, Some(word)) => {
+            word.and_then(|_| Err(Error::input(path, format!("has more than {count} values"))))
+        }
         (false, _) => Err(Error::input(path, format!("has only {} of {count} values", values.len()))),
     }
 }
@@ -256,7 +285,7 @@ mod tests {
             (fields("raw", ""), with(b"a"), "more than the 6 bytes"),
             (fields("raw", "\nbyte skip: -1"), raw[..5].to_vec(), "fewer than the 6 bytes"),
             (fields("raw", "\nbyte skip: 7"), raw.to_vec(), "fewer"),
-            (fields("raw", "\nline skip: 2"), with(b"one\n"), "2 lines to skip"),
+            (fields("raw", "\nline skip: 2"), with(b"one\n"), "nothing after the 2 lines to skip"),
             (fields("gzip", ""), gzip(&raw[..4]), "fewer"),
             (fields("gzip", ""), gzip(&vec![0; 1 << 24]), "more"),
             (fields("gzip", ""), gzip(&raw)[..20].to_vec(), "damaged"),
@@ -297,6 +326,13 @@ mod tests {
         std::fs::write(folder.path().join("the data.raw"), [7]).unwrap();
         let short = message(header("data file: the data.raw"));
         assert!(short.contains("the data.raw: has fewer"), "{short}");
+        #[cfg(unix)]
+        {
+            let endless = header("data file: /dev/zero").unwrap_err();
+            assert_eq!(endless.to_string(), "/dev/zero: cannot be read: it is no regular file");
+            let Error::Input { help: Some(help), .. } = endless else { panic!("{endless:?}") };
+            assert!(help.contains("`data file`") && help.contains("volume.nhdr"), "{help}");
+        }
         for several in ["LIST\na.raw\nb.raw", "slice%03d.raw 1 10 1", "a.raw b 2"] {
             let refused = message(header(&format!("data file: {several}")));
             assert!(refused.contains("volume.nhdr") || refused.contains("cannot be read"), "{refused}");

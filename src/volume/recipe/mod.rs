@@ -38,7 +38,7 @@ pub use weave::Weave;
 
 use super::{Quantity, Volume};
 use crate::value::exactly;
-use crate::{Error, Result};
+use crate::{Error, Result, input};
 use grid::Grid;
 use keys::{Keys, keys};
 
@@ -91,8 +91,8 @@ pub struct Recipe {
 /// [`Error::Input`] where the file cannot be read, else as [`parse`].
 pub fn load(path: impl AsRef<Path>) -> Result<Recipe> {
     let path = path.as_ref();
-    let text = std::fs::read_to_string(path)
-        .map_err(|error| Error::input(path, format!("cannot read the recipe: {error}")))?;
+    let text =
+        input::text(path).map_err(|error| Error::input(path, format!("cannot read the recipe: {error}")))?;
     parse(&path.display().to_string(), &text)
 }
 
