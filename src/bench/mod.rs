@@ -3,7 +3,9 @@
 //! A [`Sweep`] says which scenes are measured at which [`Setting`]s; [`run()`] measures it, and writes what it found as
 //! JSON, CSV and a report in HTML. Times are taken in rounds over all points of a scene ([`mod@measure`]), errors against
 //! the f64 reference, whose pictures are kept in a [`cache`]. `docs/bench.md` describes the files key by key.
+//! [`antialiasing`] compares filters instead.
 
+pub mod antialiasing;
 pub mod cache;
 pub mod convergence;
 pub mod environment;

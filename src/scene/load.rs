@@ -120,9 +120,8 @@ fn build(
     stopwatch.lap("load.volume");
 
     progress.stage("filtering the volume");
-    let opacity_distance = mean_free_path
-        .or(section.opacity_distance.map(|distance| distance.0))
-        .unwrap_or(texel_along_w);
+    let opacity_distance =
+        mean_free_path.or(section.opacity_distance.map(|distance| distance.0)).unwrap_or(texel_along_w);
     let texel = texel_edges(&shell, volume.size).map(|edge| edge / opacity_distance);
     let volume = Pyramid::build_with(volume, section.filter, texel);
     stopwatch.lap("load.pyramid");

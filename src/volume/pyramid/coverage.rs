@@ -44,11 +44,7 @@ pub fn covered_area(
 }
 
 /// A volume whose texels are computed in f64 and independently, so that it does not depend on the threads.
-pub fn volume_of(
-    size: [u32; 3],
-    quantity: Quantity,
-    texel: impl Fn([u32; 3]) -> [f64; 4] + Sync,
-) -> Volume {
+pub fn volume_of(size: [u32; 3], quantity: Quantity, texel: impl Fn([u32; 3]) -> [f64; 4] + Sync) -> Volume {
     let [width, height, depth] = size.map(|n| n as usize);
     let mut texels = vec![[0.0; 4]; width * height * depth];
     texels.par_chunks_mut(width).enumerate().for_each(|(row, out)| {

@@ -33,7 +33,9 @@ fn mean(texels: impl Iterator<Item = (f64, [f64; 4])> + Clone, quantity: Quantit
     let mut weights = 0.0;
     for (weight, [red, green, blue, alpha]) in texels.filter(|(_, texel)| !has_wall || is_wall(texel[3])) {
         let rate = if has_wall { 1.0 } else { rate(alpha, quantity) };
-        for (sum, value) in sum.iter_mut().zip([red * rate, green * rate, blue * rate, depth(alpha, quantity)]) {
+        for (sum, value) in
+            sum.iter_mut().zip([red * rate, green * rate, blue * rate, depth(alpha, quantity)])
+        {
             *sum += weight * value;
         }
         weights += weight;

@@ -127,8 +127,7 @@ mod tests {
 
     #[test]
     fn levels_halve_down_to_one_texel() {
-        let sizes =
-            |size| paper(random_volume(size)).levels.iter().map(|l| l.size).collect::<Vec<_>>();
+        let sizes = |size| paper(random_volume(size)).levels.iter().map(|l| l.size).collect::<Vec<_>>();
         assert_eq!(sizes([1, 1, 1]), [[1, 1, 1]]);
         assert_eq!(sizes([5, 3, 7]), [[5, 3, 7], [2, 1, 3], [1, 1, 1]]);
         assert_eq!(sizes([8, 2, 1]), [[8, 2, 1], [4, 1, 1], [2, 1, 1], [1, 1, 1]]);
@@ -200,10 +199,7 @@ mod tests {
         let glow = [1.5, 0.0, 3.0, 0.0];
         assert_eq!(top(&paper(column(&[glow; 4]))), glow);
         assert_eq!(top(&paper(column(&[[0.0, 0.0, 0.0, 1.0], glow]))), [1.5, 0.0, 3.0, 1.0]);
-        assert_eq!(
-            top(&paper(column(&[[f32::MAX, 0.0, 0.0, 1.0], [f32::MAX, 0.0, 0.0, 0.0]])))[0],
-            f32::MAX
-        );
+        assert_eq!(top(&paper(column(&[[f32::MAX, 0.0, 0.0, 1.0], [f32::MAX, 0.0, 0.0, 0.0]])))[0], f32::MAX);
     }
 
     #[test]
