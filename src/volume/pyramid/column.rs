@@ -1,7 +1,7 @@
 //! Columns of texels, seen along their axis and merged by the opacity equation: exact, and associative, so that four texels
 //! give one column whether merged at once or two by two.
 
-use super::coverage::{coverage, volume_of};
+use super::coverage::{coverage, texels_per_coarse, volume_of};
 use super::medium::Passage;
 use crate::volume::Volume;
 
@@ -34,7 +34,7 @@ pub fn merged_along(volume: &Volume, sight: Sight, coarse: u32, edge: f64) -> Vo
             true => taps.rev().map(passage).reduce(Passage::before),
             false => taps.map(passage).reduce(Passage::before),
         };
-        let length = edge * super::coverage::texels_per_coarse(fine, coarse);
+        let length = edge * texels_per_coarse(fine, coarse);
         whole.unwrap_or_default().texel(length, volume.quantity)
     })
 }
