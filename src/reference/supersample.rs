@@ -92,7 +92,7 @@ mod tests {
         let volume = Volume::new([8, 8, 4], (0..256).map(texel).collect()).unwrap();
         let mut scene = Scene::new(shell, Pyramid::build(volume), 0.05);
         scene.view.camera.eye *= 2.0;
-        (scene.view.width, scene.view.height) = (12, 10);
+        (scene.view.width, scene.view.height) = (24, 20);
         scene
     }
 
@@ -111,7 +111,7 @@ mod tests {
             let image = supersampled(scene, 3);
             let mut largest = 0.0_f64;
             for (i, pixel) in image.rgba.iter().enumerate() {
-                let corner = DVec2::new((i % 12) as f64, (i / 12) as f64);
+                let corner = DVec2::new((i % 24) as f64, (i / 24) as f64);
                 let mut mean = [0.0; 4];
                 for ray in 0..9 {
                     let offset = DVec2::new(f64::from(ray % 3), f64::from(ray / 3)) / 3.0 + 1.0 / 6.0 + shift;

@@ -27,8 +27,8 @@ use super::medium::Passage;
 use super::visibility::Visibility;
 use crate::volume::Volume;
 
-/// How many texels a ray that runs sideways goes through in one layer. It has the least geometric mean of RMSE on
-/// fur, fog, cloth, stones and clouds of 1, 2, 4 and 8; 1 is off by 5 %.
+/// How many texels a ray that runs sideways goes through in one layer. It is measured, not derived: beside 1 it lowers the
+/// RMSE of fur, fog, cloth, stones and clouds by 2 to 7 %, and beyond it little changes.
 const REACH: f64 = 2.0;
 
 /// The directions from which columns are looked at: from outside along w, from either side along u and v.

@@ -21,7 +21,11 @@ pub struct Passage {
 
 impl Passage {
     /// Through a texel over a length.
-    pub fn through([red, green, blue, alpha]: [f64; 4], length: f64, quantity: Quantity) -> Self {
+    pub fn through(texel: [f64; 4], length: f64, quantity: Quantity) -> Self {
+        if texel == [0.0; 4] {
+            return Self::default(); // as the formulas say, but most of many volumes is empty
+        }
+        let [red, green, blue, alpha] = texel;
         let emission = emission(alpha, length, quantity);
         let light = [red, green, blue].map(|colour| colour * emission);
         Self { depth: depth(alpha, quantity) * length, light }
@@ -40,6 +44,9 @@ impl Passage {
 
     /// This, with `behind` behind it.
     pub fn before(self, behind: Self) -> Self {
+        if self.depth == 0.0 && self.light == [0.0; 3] {
+            return behind;
+        }
         let transmittance = (-self.depth).exp();
         let light = std::array::from_fn(|c| self.light[c] + transmittance * behind.light[c]);
         Self { depth: self.depth + behind.depth, light }
