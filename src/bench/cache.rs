@@ -63,7 +63,7 @@ pub fn reference(
     kept(fingerprint, [scene.view.width, scene.view.height], folder, warnings, render)
 }
 
-/// As [`reference`], of any picture by the reference: `render` computes it where `folder` has none of that fingerprint.
+/// As [`fn@reference`], of any picture by the reference: `render` computes it where `folder` has none of that fingerprint.
 ///
 /// # Errors
 /// [`Error::Output`](crate::Error::Output) where the picture cannot be kept, and those of `render`.
