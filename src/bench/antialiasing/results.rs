@@ -10,13 +10,13 @@ use crate::frame::Image;
 use crate::metric::Metrics;
 use crate::volume::Filter;
 
-/// Of [`Results`]; another number means that keys have another meaning.
+/// Of [`Results::schema`].
 pub const SCHEMA: u32 = 1;
 
 /// All that was measured.
 #[derive(Debug, Clone, Serialize)]
 pub struct Results {
-    /// [`SCHEMA`].
+    /// 1; another number where keys have another meaning.
     pub schema: u32,
     /// What was asked for.
     pub sweep: Sweep,
