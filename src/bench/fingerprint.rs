@@ -7,15 +7,16 @@ use bytemuck::NoUninit;
 use serde::{Deserialize, Serialize};
 
 use crate::reference::TOLERANCE;
-use crate::scene::{Medium, Scene, View};
-use crate::volume::Quantity;
+use crate::scene::{Scene, View};
+use crate::volume::{Quantity, Volume};
 
 /// The code that a cached reference comes from: were it changed, so might its pictures be.
-const REFERENCE_CODE: [(&str, &str); 5] = [
+const REFERENCE_CODE: [(&str, &str); 6] = [
     ("crossing.rs", include_str!("../reference/crossing.rs")),
     ("integrate.rs", include_str!("../reference/integrate.rs")),
     ("mod.rs", include_str!("../reference/mod.rs")),
     ("quadrature.rs", include_str!("../reference/quadrature.rs")),
+    ("supersample.rs", include_str!("../reference/supersample.rs")),
     ("texture.rs", include_str!("../reference/texture.rs")),
 ];
 
@@ -62,31 +63,43 @@ impl Fingerprint {
     /// Of everything that the reference's picture of `view` depends on: geometry, texture, medium, camera, and the
     /// reference itself. How finely a method marches is not among it.
     pub fn of_reference(scene: &Scene, view: &View) -> Self {
-        let mut builder = Self::builder("reference").bytes(env!("CARGO_PKG_VERSION").as_bytes());
-        for (_, code) in REFERENCE_CODE {
-            builder = builder.bytes(code.as_bytes());
-        }
-        let Medium { opacity_distance, lod_footprint } = scene.medium;
-        let View { camera, width, height, depth: _ } = view;
-        builder = builder
-            .numbers(&[TOLERANCE, opacity_distance, lod_footprint, camera.fov_y, camera.near])
-            .numbers(&[camera.eye, camera.target, camera.up])
-            .numbers(&[*width, *height])
-            .numbers(&scene.shell.topology.tetrahedra)
-            .numbers(&scene.shell.vertices)
-            .numbers(&scene.shell.texture);
-        for cell in &scene.shell.cells {
-            builder = builder.numbers(&cell.gradients).numbers(&[cell.texture_from_world]);
-        }
-        for level in &scene.volume.levels {
-            let quantity = match level.quantity {
-                Quantity::Opacity => "opacity",
-                Quantity::Extinction => "extinction",
-            };
-            builder = builder.bytes(quantity.as_bytes()).numbers(&level.size).numbers(&level.texels);
-        }
-        builder.finish()
+        let builder = Self::builder("reference").numbers(&[TOLERANCE, scene.medium.lod_footprint]);
+        seen(builder, scene, view, &scene.volume.levels)
     }
+
+    /// The same of [`reference::render_supersampled`](crate::reference::render_supersampled) with `side` times `side` rays
+    /// a pixel: of the volume the first level alone is among it.
+    pub fn of_supersampled(scene: &Scene, view: &View, side: u32, tolerance: f64) -> Self {
+        let builder = Self::builder("supersampled").numbers(&[tolerance]).numbers(&[side]);
+        seen(builder, scene, view, &scene.volume.levels[..1])
+    }
+}
+
+/// Adds what any picture by the reference depends on.
+fn seen(mut builder: Builder, scene: &Scene, view: &View, levels: &[Volume]) -> Fingerprint {
+    builder = builder.bytes(env!("CARGO_PKG_VERSION").as_bytes());
+    for (_, code) in REFERENCE_CODE {
+        builder = builder.bytes(code.as_bytes());
+    }
+    let View { camera, width, height, depth: _ } = view;
+    builder = builder
+        .numbers(&[scene.medium.opacity_distance, camera.fov_y, camera.near])
+        .numbers(&[camera.eye, camera.target, camera.up])
+        .numbers(&[*width, *height])
+        .numbers(&scene.shell.topology.tetrahedra)
+        .numbers(&scene.shell.vertices)
+        .numbers(&scene.shell.texture);
+    for cell in &scene.shell.cells {
+        builder = builder.numbers(&cell.gradients).numbers(&[cell.texture_from_world]);
+    }
+    for level in levels {
+        let quantity = match level.quantity {
+            Quantity::Opacity => "opacity",
+            Quantity::Extinction => "extinction",
+        };
+        builder = builder.bytes(quantity.as_bytes()).numbers(&level.size).numbers(&level.texels);
+    }
+    builder.finish()
 }
 
 #[cfg(test)]
@@ -95,7 +108,7 @@ pub(crate) mod tests {
     use crate::mesh::generate::{Generator, Torus};
     use crate::scene::March;
     use crate::shell::{Shell, ShellOptions};
-    use crate::volume::{Pyramid, Volume};
+    use crate::volume::Pyramid;
 
     /// A torus of fog in 32 x 32 pixels.
     pub(crate) fn scene() -> Scene {
@@ -139,6 +152,22 @@ pub(crate) mod tests {
         }
         let finer = Scene { march: March::Paper { samples: 3 }, ..scene() };
         assert_eq!(original, print(&finer));
+    }
+
+    #[test]
+    fn of_many_rays_every_change_counts_but_those_of_coarse_levels() {
+        let print = |scene: &Scene| Fingerprint::of_supersampled(scene, &scene.view, 8, 1e-4);
+        let original = print(&scene());
+        for (name, change) in CHANGES {
+            let mut changed = scene();
+            change(&mut changed);
+            let has_no_part = ["a texel of the last level", "the level of detail"].contains(name);
+            assert_eq!(original == print(&changed), has_no_part, "{name}");
+        }
+        let scene = scene();
+        assert_ne!(original, Fingerprint::of_supersampled(&scene, &scene.view, 4, 1e-4));
+        assert_ne!(original, Fingerprint::of_supersampled(&scene, &scene.view, 8, 1e-5));
+        assert_ne!(original, Fingerprint::of_reference(&scene, &scene.view));
     }
 
     #[test]

@@ -12,7 +12,8 @@
 //! - `crossing`: which tetrahedra lie on a ray, by a bounding volume hierarchy and clipping;
 //! - `texture`: the texture along the ray, a cubic in each cell of texel centres;
 //! - `quadrature`: the nested rule of a panel;
-//! - `integrate`: the coupled integral along the ray, with its error control.
+//! - `integrate`: the coupled integral along the ray, with its error control;
+//! - `supersample`: pixels of many rays, for filters to be measured against.
 //!
 //! Rays are measured by *depth* `z` along the camera's forward axis. Where tetrahedra overlap, in a shell
 //! that intersects itself, their media add. A texel cell whose eight corners all have alpha 1 is a wall: what
@@ -21,7 +22,10 @@
 mod crossing;
 mod integrate;
 mod quadrature;
+mod supersample;
 mod texture;
+
+pub use supersample::render_supersampled;
 
 use std::sync::atomic::{AtomicU32, Ordering};
 
@@ -54,6 +58,7 @@ pub struct Sample {
 pub struct Reference<'a> {
     scene: &'a Scene,
     view: View,
+    lod_footprint: f64,
     tolerance: f64,
     /// The largest colour (premultiplied by nothing) of any texel, at least 1.
     brightness: f64,
@@ -84,6 +89,7 @@ impl<'a> Reference<'a> {
         Self {
             scene,
             view: *view,
+            lod_footprint: scene.medium.lod_footprint,
             tolerance: TOLERANCE,
             brightness: brightness(scene),
             rule: Rule::new(),
@@ -95,6 +101,12 @@ impl<'a> Reference<'a> {
     #[must_use]
     pub fn with_tolerance(self, tolerance: f64) -> Self {
         Self { tolerance, ..self }
+    }
+
+    /// The same with another footprint than the medium's: see [`Medium::lod_footprint`](crate::scene::Medium::lod_footprint).
+    #[must_use]
+    pub fn with_lod_footprint(self, lod_footprint: f64) -> Self {
+        Self { lod_footprint, ..self }
     }
 
     /// The ray through the centre of pixel `(x, y)`.

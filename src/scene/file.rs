@@ -17,7 +17,7 @@ use crate::value::{
     Colour, Exactly, FieldOfView, Finite, Fraction, NotNegative, PictureSize, Pixels, Positive, Rounds,
     Samples, Step,
 };
-use crate::volume::TransferFunction;
+use crate::volume::{Filter, TransferFunction};
 
 /// A whole scene file.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
@@ -87,6 +87,9 @@ pub struct VolumeSection {
     /// In pixels.
     #[serde(default = "one_pixel")]
     pub lod_footprint: NotNegative,
+    /// How texels are merged.
+    #[serde(default)]
+    pub filter: Filter,
 }
 
 /// `[volume.density]`: the scalars of a file are densities.

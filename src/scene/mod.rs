@@ -32,7 +32,7 @@ use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 use crate::shell::Shell;
-use crate::volume::Pyramid;
+use crate::volume::{Filter, Pyramid};
 
 /// A loaded scene: all that a method needs, whatever file it came from.
 #[derive(Debug, Clone)]
@@ -112,7 +112,34 @@ impl Default for March {
     }
 }
 
+/// The mean lengths, in world units, of the edges of a texel along u, v and w, where a texture of `size` texels fills the
+/// shell: of all tetrahedra that the texture is not flat in, weighted by volume.
+pub fn texel_edges(shell: &Shell, size: [u32; 3]) -> [f64; 3] {
+    let mut edges = DVec3::ZERO;
+    let mut volume = 0.0;
+    for (cell, vertices) in shell.cells.iter().zip(&shell.topology.tetrahedra) {
+        let world_from_texture = cell.texture_from_world.inverse();
+        if world_from_texture.is_finite() {
+            let [a, b, c, d] = vertices.map(|vertex| shell.vertices[vertex as usize]);
+            let weight = (b - a).cross(c - a).dot(d - a).abs();
+            let [u, v, w] = [0, 1, 2].map(|axis| world_from_texture.col(axis).length());
+            edges += weight * DVec3::new(u, v, w);
+            volume += weight;
+        }
+    }
+    // Nowhere is there a texel: any length will do.
+    let edges = if volume > 0.0 { edges / volume } else { DVec3::ONE };
+    [0, 1, 2].map(|axis| edges[axis] / f64::from(size[axis]))
+}
+
 impl Scene {
+    /// The pyramid above the same full volume by another filter.
+    pub fn filtered(&self, filter: Filter) -> Pyramid {
+        let full = self.volume.levels[0].clone();
+        let texel = texel_edges(&self.shell, full.size).map(|edge| edge / self.medium.opacity_distance);
+        Pyramid::build_with(full, filter, texel)
+    }
+
     /// A shell filled with a texture, whose opacity is that of a path of `opacity_distance` world units: all of
     /// it in a picture of 512 x 512 pixels, at the default level of detail and step.
     pub fn new(shell: Shell, volume: Pyramid, opacity_distance: f64) -> Self {

@@ -14,6 +14,7 @@ mod transfer;
 pub use file::{info, read};
 pub use interpretation::Interpretation;
 pub use ktx2_file::{write_raw, write_volume};
+pub use pyramid::Filter;
 pub use raw::{AlphaMode, ChannelRange, RawVolume, VolumeInfo};
 pub use sample::Sample;
 pub use transfer::{ControlPoint, InvalidTransferFunction, TransferFunction};
