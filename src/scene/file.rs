@@ -10,6 +10,7 @@ use std::path::PathBuf;
 use serde::Deserialize;
 use toml::Spanned;
 
+use super::PIXEL_FOOTPRINT;
 use super::camera::DEFAULT_FOV_DEGREES;
 use crate::mesh::generate::Generator;
 use crate::mesh::projection::Projection;
@@ -85,7 +86,7 @@ pub struct VolumeSection {
     /// World units; by default one level-0 texel along w.
     pub opacity_distance: Option<Positive>,
     /// In pixels.
-    #[serde(default = "one_pixel")]
+    #[serde(default = "pixel_footprint")]
     pub lod_footprint: NotNegative,
     /// How texels are merged.
     #[serde(default)]
@@ -177,8 +178,8 @@ fn no_offset() -> Exactly<2, Finite> {
     Exactly([Finite(0.0); 2])
 }
 
-fn one_pixel() -> NotNegative {
-    NotNegative(1.0)
+fn pixel_footprint() -> NotNegative {
+    NotNegative(PIXEL_FOOTPRINT)
 }
 
 fn default_fov() -> FieldOfView {

@@ -64,7 +64,7 @@ pub struct Medium {
     /// The path length, in world units, whose opacity, or optical depth, the texture's alpha is: see
     /// [`Quantity`](crate::volume::Quantity).
     pub opacity_distance: f64,
-    /// The filter footprint in pixels (1 = one pixel; 0 = always level 0).
+    /// How many pixels wide a texel of the level that is read is; 0 always reads level 0. See [`PIXEL_FOOTPRINT`].
     ///
     /// At a point at depth `z` (world units along the camera's forward axis) in a tetrahedron the level of
     /// detail is `log2(lod_footprint * z * pixel * rho)`, clamped to `0..=last level`, where `pixel` is
@@ -73,6 +73,12 @@ pub struct Medium {
     /// premultiplied RGBA are blended linearly.
     pub lod_footprint: f64,
 }
+
+/// The footprint at which a texture is as sharp as the pixels: a texel of the level read is `1 / sqrt(3)` pixels wide.
+///
+/// A pixel's box of width `p` has the variance `p^2 / 12`. A texel of width `t` is a mean over a box itself, `t^2 / 12`, and its
+/// linear interpolation spreads it by a tent of twice its width, `t^2 / 6`; together `t^2 / 4`.
+pub const PIXEL_FOOTPRINT: f64 = 0.577_350_269_189_625_8;
 
 /// How samples are spread along a ray in one tetrahedron.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -147,7 +153,7 @@ impl Scene {
         Self {
             shell,
             volume,
-            medium: Medium { opacity_distance, lod_footprint: 1.0 },
+            medium: Medium { opacity_distance, lod_footprint: PIXEL_FOOTPRINT },
             view: View { camera, width: 512, height: 512, depth: false },
             march: March::default(),
         }

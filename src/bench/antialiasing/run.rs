@@ -131,7 +131,7 @@ impl Bench<'_> {
             let images =
                 views.iter().map(|view| Ok(method.render(view)?.image)).collect::<Result<Vec<_>>>()?;
             for ((image, reference), picture) in images.iter().zip(&references).zip(&mut results.pictures) {
-                let error = metric::compare_over(image, reference, background.unwrap_or_default())?;
+                let error = metric::compare_over(image, reference, background.unwrap_or_default())?.metrics;
                 picture.points.push(Point::new(filter, error, image, reference));
             }
             filtered.push(images);
