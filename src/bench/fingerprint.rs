@@ -20,6 +20,9 @@ const REFERENCE_CODE: [(&str, &str); 6] = [
     ("texture.rs", include_str!("../reference/texture.rs")),
 ];
 
+/// What of a scene the reference asks for: rays, and the density of texels across them.
+const SCENE_CODE: [&str; 2] = [include_str!("../scene/camera.rs"), include_str!("../scene/mod.rs")];
+
 /// Written as 32 hexadecimal digits.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(transparent)]
@@ -79,6 +82,9 @@ impl Fingerprint {
 fn seen(mut builder: Builder, scene: &Scene, view: &View, levels: &[Volume]) -> Fingerprint {
     builder = builder.bytes(env!("CARGO_PKG_VERSION").as_bytes());
     for (_, code) in REFERENCE_CODE {
+        builder = builder.bytes(code.as_bytes());
+    }
+    for code in SCENE_CODE {
         builder = builder.bytes(code.as_bytes());
     }
     let View { camera, width, height, depth: _ } = view;

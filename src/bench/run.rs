@@ -85,13 +85,14 @@ pub fn run(sweep: &Sweep, options: &Options<'_>, setup: &Setup<'_>) -> Result<Ou
             cache: options.cache,
         };
         let finished = results.scenes.len();
+        let begun = earlier.next();
         let mut keep = |scene: &SceneResults| {
             results.scenes.truncate(finished);
             results.scenes.push(scene.clone());
+            results.scenes.extend(earlier.clone());
             results.write(&json)
         };
-        let (scene, of_scene) =
-            measure(&subject, earlier.next(), setup, &remaining, &mut warnings, &mut keep)?;
+        let (scene, of_scene) = measure(&subject, begun, setup, &remaining, &mut warnings, &mut keep)?;
         results.scenes.truncate(finished);
         results.scenes.push(scene);
         pictures.push(of_scene);
@@ -124,11 +125,11 @@ fn resumed(json: &Path, fresh: &Results) -> Result<Results> {
         return Err(other("sweep"));
     }
     let device = |results: &Results| {
-        let Environment { device, driver, version, .. } = &results.environment;
-        [device.clone(), driver.clone(), version.clone()]
+        let Environment { device, driver, version, commit, .. } = &results.environment;
+        (device.clone(), driver.clone(), version.clone(), commit.clone())
     };
     if device(&results) != device(fresh) {
-        return Err(other("device or version"));
+        return Err(other("device, version or commit"));
     }
     Ok(results)
 }

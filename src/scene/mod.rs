@@ -95,7 +95,8 @@ pub enum March {
         step: f64,
     },
     /// Cell by cell of texel centres, where the texture is a cubic along the ray, by three-point Gauss-Legendre.
-    /// Optical depth is exact where the texture holds extinction.
+    /// Optical depth is exact where the texture holds extinction. Tetrahedra in cycles are marched by midpoints all the same,
+    /// eight a texel.
     Exact,
 }
 

@@ -111,7 +111,8 @@ impl std::fmt::Display for Channel {
 }
 
 impl Volume {
-    /// A volume of `size` texels along u, v, w, whose `texels` are `[r a, g a, b a, a]`, u fastest, with opacities.
+    /// A volume of `size` texels along u, v, w, whose `texels` are `[r a, g a, b a, a]`, u fastest, with opacities. Colour where
+    /// alpha is 0 would not be seen, and is dropped.
     ///
     /// # Errors
     /// The first of the ranges promised by [`Volume`]'s fields that is broken, and where.
@@ -123,7 +124,7 @@ impl Volume {
     ///
     /// # Errors
     /// As [`Volume::new`].
-    pub fn of(quantity: Quantity, size: [u32; 3], texels: Vec<[f32; 4]>) -> Result<Self, InvalidVolume> {
+    pub fn of(quantity: Quantity, size: [u32; 3], mut texels: Vec<[f32; 4]>) -> Result<Self, InvalidVolume> {
         let most = if quantity == Quantity::Opacity { 1.0 } else { f32::MAX };
         let count = texel_count(size).ok_or(InvalidVolume::Size { size })?;
         if count != texels.len() {
@@ -140,6 +141,7 @@ impl Volume {
                 return Err(InvalidVolume::Value { at: texel_at(size, index), channel, value });
             }
         }
+        texels.iter_mut().filter(|texel| texel[3] == 0.0).for_each(|texel| *texel = [0.0; 4]);
         Ok(Self { size, texels, quantity })
     }
 

@@ -5,10 +5,10 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 use toml::Spanned;
 
-use crate::Result;
 use crate::scene::text::Text;
 use crate::value::{PictureSize, Positive, Samples, Step};
 use crate::volume::Filter;
+use crate::{Error, Result, input};
 
 /// What is measured.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -61,10 +61,20 @@ fn an_eighth() -> Step {
 const RAYS: u32 = 64;
 
 impl Sweep {
+    /// Reads a sweep file.
+    ///
+    /// # Errors
+    /// [`Error::Input`] for a file that cannot be read, else as [`parse`](Self::parse).
+    pub fn load(path: &Path) -> Result<Self> {
+        let text = input::text(path)
+            .map_err(|error| Error::input(path, format!("the sweep file cannot be read: {error}")))?;
+        Self::parse(&path.display().to_string(), text, path.parent().unwrap_or(Path::new("")))
+    }
+
     /// Reads a sweep from a text: `name` is what errors call it, `base_dir` where its paths start.
     ///
     /// # Errors
-    /// [`Error::Text`](crate::Error::Text), with the spot.
+    /// [`Error::Text`], with the spot.
     pub fn parse(name: &str, text: String, base_dir: &Path) -> Result<Self> {
         let plans = span_of_section(&text, "plans");
         let text = Text::new(name, text, &[])?;
@@ -107,8 +117,12 @@ impl Sweep {
     }
 }
 
-/// Whether a TOML text is a sweep of this kind.
-pub fn is_antialiasing(text: &str) -> bool {
+/// Whether a file is a sweep of this kind.
+pub fn is_antialiasing(path: &Path) -> bool {
+    input::text(path).is_ok_and(|text| looks_like_antialiasing(&text))
+}
+
+fn looks_like_antialiasing(text: &str) -> bool {
     span_of_section(text, "antialiasing").is_some()
 }
 
@@ -152,7 +166,10 @@ step = 0.25
         assert_eq!(parse(SWEEP).unwrap(), expected);
         let least = parse("scenes = ['a.toml']\nantialiasing = { distances = [1] }").unwrap();
         assert_eq!((least.rays, least.step, least.filters.as_slice()), (64, 0.125, Filter::ALL.as_slice()));
-        assert!(is_antialiasing(SWEEP) && !is_antialiasing("scenes = ['a.toml']\n[plans]\ndefault = [1]"));
+        assert!(
+            looks_like_antialiasing(SWEEP)
+                && !looks_like_antialiasing("scenes = ['a.toml']\n[plans]\ndefault = [1]")
+        );
     }
 
     /// What is replaced in [`SWEEP`] by what, the spot that must be underlined, a part of the message.

@@ -12,9 +12,9 @@ use crate::cli::Talk;
 /// [`Error::Text`], and [`Error::Usage`] for options that have no meaning here.
 pub fn sweep(arguments: &Arguments) -> Result<Option<Sweep>> {
     let [file] = arguments.files.as_slice() else { return Ok(None) };
-    let Some(text) = std::fs::read_to_string(file).ok().filter(|text| is_antialiasing(text)) else {
+    if !is_antialiasing(file) {
         return Ok(None);
-    };
+    }
     let levels_given = arguments.steps.is_some() || arguments.samples.is_some() || arguments.exact;
     if levels_given || arguments.runs.is_some() || arguments.resume {
         return Err(Error::Usage {
@@ -22,8 +22,7 @@ pub fn sweep(arguments: &Arguments) -> Result<Option<Sweep>> {
             help: Some("leave out --steps, --samples, --exact, --runs and --resume".to_owned()),
         });
     }
-    let folder = file.parent().unwrap_or("".as_ref());
-    let mut sweep = Sweep::parse(&file.display().to_string(), text, folder)?;
+    let mut sweep = Sweep::load(file)?;
     sweep.define.extend(arguments.define.iter().cloned());
     Ok(Some(sweep))
 }

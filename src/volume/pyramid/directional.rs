@@ -52,7 +52,7 @@ pub fn levels(full: &Volume, geometry: &Geometry) -> Vec<Volume> {
         volume_of(size, full.quantity, |at| {
             let index = index(size, at);
             let passages = [0, 1, 2, 3, 4].map(|sight| (weights[sight], seen[sight][level - 1][index]));
-            Passage::mean(&passages).texel(geometry.beam_length(level), full.quantity)
+            Passage::mean(passages.into_iter()).texel(geometry.beam_length(level), full.quantity)
         })
     };
     (1..geometry.sizes.len()).map(merged).collect()
@@ -99,7 +99,7 @@ fn bundles(
             let texel = columns.texel(column).map(f64::from);
             (weight, Passage::through(texel, length, columns.quantity))
         });
-        let texel = Passage::mean(&passages.collect::<Vec<_>>()).texel(length, columns.quantity);
+        let texel = Passage::mean(passages.collect::<Vec<_>>().into_iter()).texel(length, columns.quantity);
         Passage::through(texel, geometry.beam_length(level), columns.quantity)
     };
     let [width, height] = [size[0], size[1]];

@@ -37,7 +37,8 @@ impl Passage {
             Quantity::Opacity => opacity(self.depth / length),
             Quantity::Extinction => self.depth / length,
         };
-        let emission = emission(alpha, length, quantity);
+        // Not `E(alpha, length)`: what is so dense that alpha rounds to 1 is no wall yet.
+        let emission = if alpha == 0.0 { length } else { opacity(self.depth) / alpha };
         let [red, green, blue] = self.light.map(|light| light / emission);
         [red, green, blue, alpha]
     }
@@ -53,12 +54,12 @@ impl Passage {
     }
 
     /// The mean transmittance and the mean light of passages side by side, each with its weight.
-    pub fn mean(passages: &[(f64, Self)]) -> Self {
+    pub fn mean(passages: impl Iterator<Item = (f64, Self)> + Clone) -> Self {
         // Relative to the thinnest, so that neither 1 - opacity nor a transmittance below 1e-308 is rounded away.
-        let thinnest = passages.iter().map(|(_, passage)| passage.depth).fold(f64::INFINITY, f64::min);
+        let thinnest = passages.clone().map(|(_, passage)| passage.depth).fold(f64::INFINITY, f64::min);
         let mut sum = [0.0; 4];
         let mut weights = 0.0;
-        for &(weight, Self { depth, light: [red, green, blue] }) in passages {
+        for (weight, Self { depth, light: [red, green, blue] }) in passages {
             let opacity = if depth > thinnest { opacity(depth - thinnest) } else { 0.0 };
             for (sum, value) in sum.iter_mut().zip([red, green, blue, opacity]) {
                 *sum += weight * value;
@@ -104,7 +105,7 @@ mod tests {
     fn the_mean_of_transmittances_keeps_its_accuracy_at_both_ends() {
         let mean = |depths: &[f64]| {
             let passages = depths.iter().map(|&depth| (0.5, Passage { depth, light: [0.0; 3] }));
-            Passage::mean(&passages.collect::<Vec<_>>()).depth
+            Passage::mean(passages).depth
         };
         for depth in [0.0, 1e-300, 1e-9, 1.0, 1e5, f64::INFINITY] {
             assert_eq!(mean(&[depth, depth]), depth);

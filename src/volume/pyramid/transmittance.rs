@@ -28,7 +28,7 @@ fn merged(full: &Volume, size: [u32; 3], length: f64) -> Volume {
             let weight = taps.iter().map(|tap| tap.1).product();
             (weight, Passage::through(texel, length, full.quantity))
         });
-        Passage::mean(&passages.collect::<Vec<_>>()).texel(length, full.quantity)
+        Passage::mean(passages).texel(length, full.quantity)
     })
 }
 
