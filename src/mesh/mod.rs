@@ -2,6 +2,7 @@
 
 pub mod generate;
 pub mod info;
+pub mod model;
 pub mod normals;
 pub mod obj;
 pub mod projection;
