@@ -1,5 +1,6 @@
 //! The base mesh: triangles with positions, normals and texture coordinates.
 
+pub mod figure;
 pub mod generate;
 pub mod info;
 pub mod model;

@@ -4,7 +4,6 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use clap::Args;
-use glam::DVec2;
 use mesoshell::frame::{Image, file};
 use mesoshell::gpu::DeviceChoice;
 use mesoshell::mesh::generate::{Generator, Plane};
@@ -108,15 +107,20 @@ fn ramp(values: &[f32]) -> std::result::Result<TransferFunction, volume::Invalid
 
 /// One tile on a plane, seen from the front, a little from the right and above, in a square picture.
 fn slab(volume: Volume, height: f64, pixels: u32) -> Result<Scene> {
-    let plane = Plane { segments: 1, ..Plane::default() };
     let [width, across, depth] = volume.size.map(f64::from);
-    // A tile is as wide as the plane; along v, where it has more or fewer texels, part of one or more than one are seen.
-    let options =
-        ShellOptions { uv_scale: DVec2::new(1.0, width / across), ..ShellOptions::new(height * plane.size) };
+    let plane = Plane { segments: 1, ..Plane::default() };
+    let options = ShellOptions::new(height * plane.size);
+    let mut mesh = Generator::Plane(plane).build()?;
+    // A tile is as wide as the plane, and as deep as cubic texels make it.
+    for position in &mut mesh.positions {
+        position.z *= across / width;
+    }
     let opacity_distance = options.thickness / depth;
-    let shell = Shell::build(&Generator::Plane(plane).build()?, &options)?;
+    let shell = Shell::build(&mesh, &options)?;
     let mut scene = Scene::new(shell, Pyramid::build(volume), opacity_distance);
     [scene.view.width, scene.view.height] = [pixels; 2];
+    // The slab fills less than the sphere around it.
+    scene.view.camera.fov_y *= 0.85;
     Ok(scene)
 }
 

@@ -12,11 +12,14 @@
 
 mod check;
 mod materials;
+mod write;
 
 use std::io::Cursor;
 use std::path::Path;
 
 use glam::{DVec2, DVec3, Vec3};
+
+pub use write::write_model;
 
 use super::model::{Material, Model};
 use super::weld::{Welded, weld};

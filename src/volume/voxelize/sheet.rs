@@ -108,3 +108,61 @@ fn clipped([low, high]: [f64; 2], slope: f64, limit: f64) -> [f64; 2] {
         EMPTY
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use rand::RngExt;
+    use rand_pcg::Pcg32;
+
+    use super::*;
+
+    /// The distance of a point from a triangle, by brute force: the nearest of many points of it.
+    fn distance([a, b, c]: [DVec3; 3], point: DVec3) -> f64 {
+        const STEPS: u32 = 60;
+        let mut nearest = f64::INFINITY;
+        for i in 0..=STEPS {
+            for j in 0..=STEPS - i {
+                let [s, t] = [i, j].map(|n| f64::from(n) / f64::from(STEPS));
+                nearest = nearest.min(point.distance(a + s * (b - a) + t * (c - a)));
+            }
+        }
+        nearest
+    }
+
+    #[test]
+    fn a_ray_is_inside_where_the_triangle_is_near() {
+        let mut random = Pcg32::new(9, 9);
+        let mut tested = [0; 2];
+        for trial in 0..60 {
+            let mut corners: [DVec3; 3] =
+                std::array::from_fn(|_| DVec3::from_array(std::array::from_fn(|_| random.random::<f64>())));
+            // Some lie along the rays, some across, some are needles.
+            match trial % 4 {
+                0 => corners[1] = corners[0] + 0.7 * DVec3::Z,
+                1 => corners.iter_mut().for_each(|corner| corner.z = 0.25),
+                2 => corners[2] = corners[0].lerp(corners[1], 0.4),
+                _ => {}
+            }
+            let [a, b, c] = corners;
+            let facets =
+                [Facet { corners, area: 0.5 * (b - a).cross(c - a), uvs: [DVec2::ZERO; 3], material: 0 }];
+            let sheet = Sheet { facets: &facets, radius: 0.2 };
+            for _ in 0..20 {
+                let point =
+                    DVec2::new(1.4 * random.random::<f64>() - 0.2, 1.4 * random.random::<f64>() - 0.2);
+                let mut turns = Vec::new();
+                sheet.cross(0, point, &mut |turn| turns.push(turn.w));
+                for w in (0..12).map(|i| 0.15 * f64::from(i) - 0.4) {
+                    let is_inside = turns.first().is_some_and(|&enter| enter < w && w < turns[1]);
+                    // Points of the brute force are at most sqrt(2) / 60 apart, and 2^(1/2) apart the corners.
+                    let distance = distance(corners, point.extend(w));
+                    if (distance - 0.2).abs() > 0.03 {
+                        assert_eq!(is_inside, distance < 0.2, "trial {trial}: {distance} at {point}, {w}");
+                        tested[usize::from(is_inside)] += 1;
+                    }
+                }
+            }
+        }
+        assert!(tested.iter().all(|&count| count > 1000), "{tested:?}");
+    }
+}

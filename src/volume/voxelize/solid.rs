@@ -66,3 +66,78 @@ fn is_left(from: DVec2, to: DVec2, point: DVec2) -> bool {
     // The derivative of the same determinant by the shift.
     if from.y != to.y { to.y < from.y } else { to.x > from.x }
 }
+
+#[cfg(test)]
+mod tests {
+    use rand::RngExt;
+    use rand_pcg::Pcg32;
+
+    use super::*;
+
+    fn facet(corners: [DVec3; 3]) -> Facet {
+        let [a, b, c] = corners;
+        Facet { corners, area: 0.5 * (b - a).cross(c - a), uvs: [DVec2::ZERO; 3], material: 0 }
+    }
+
+    /// The turns of the ray through `point`, from below.
+    fn turns(facets: &[Facet], point: DVec2) -> Vec<Turn> {
+        let solid = Solid::new(facets);
+        let mut turns = Vec::new();
+        for part in 0..solid.parts() {
+            solid.cross(part, point, &mut |turn| turns.push(turn));
+        }
+        turns.sort_by(|a, b| a.w.total_cmp(&b.w));
+        turns
+    }
+
+    #[test]
+    fn a_ray_through_a_corner_goes_in_once_and_out_once() {
+        let corner = |axis: usize, sign: f64| DVec3::AXES[axis] * sign;
+        let mut octahedron = Vec::new();
+        for signs in 0..8 {
+            let sign = |axis: u32| if signs >> axis & 1 == 0 { 1.0 } else { -1.0 };
+            let [a, b, c] = [corner(0, sign(0)), corner(1, sign(1)), corner(2, sign(2))];
+            let outward = sign(0) * sign(1) * sign(2) > 0.0;
+            octahedron.push(facet(if outward { [a, b, c] } else { [a, c, b] }));
+        }
+        // Through two corners; through edges above and below; through the rim's inside.
+        for (point, height) in
+            [([0.0, 0.0], 1.0), ([0.25, 0.0], 0.75), ([0.0, -0.5], 0.5), ([0.25, 0.25], 0.5)]
+        {
+            let turns = turns(&octahedron, DVec2::from(point));
+            let found: Vec<_> = turns.iter().map(|turn| (turn.w, turn.winding)).collect();
+            assert_eq!(found, [(-height, 1), (height, -1)], "{point:?}");
+        }
+    }
+
+    #[test]
+    fn whatever_a_ray_hits_its_turns_sum_up_to_zero() {
+        // Corners on a small grid, rays through its points: most hit an edge or a corner, and many triangles are seen edge on.
+        let mut random = Pcg32::new(3, 3);
+        let (mut hits, mut wrong_without_shift) = (0, 0);
+        for _ in 0..500 {
+            let [a, b, c, d] = std::array::from_fn(|_| {
+                DVec3::from_array(std::array::from_fn(|_| f64::from(random.random_range(0..5))))
+            });
+            let facets = [[a, c, b], [a, b, d], [b, c, d], [c, a, d]].map(facet);
+            for point in (0..25).map(|i| DVec2::new(f64::from(i % 5), f64::from(i / 5))) {
+                let turns = turns(&facets, point);
+                assert_eq!(
+                    turns.iter().map(|turn| turn.winding).sum::<i32>(),
+                    0,
+                    "{a} {b} {c} {d} at {point}"
+                );
+                assert!(turns.len() == 2 || turns.is_empty(), "a tetrahedron is convex");
+                hits += turns.len();
+                // The test that this one must tell from the right one: edges belong to all their triangles.
+                let naive = facets.iter().map(|facet| {
+                    let [p, q, r] = facet.corners.map(|corner| corner.truncate() - point);
+                    let sides = [p.perp_dot(q), q.perp_dot(r), r.perp_dot(p)];
+                    i32::from(sides.iter().all(|&x| x >= 0.0)) - i32::from(sides.iter().all(|&x| x <= 0.0))
+                });
+                wrong_without_shift += usize::from(naive.sum::<i32>() != 0);
+            }
+        }
+        assert!(hits > 1000 && wrong_without_shift > 100, "{hits} {wrong_without_shift}");
+    }
+}
