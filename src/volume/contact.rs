@@ -38,10 +38,18 @@ pub fn contact_sheet(volume: &Volume) -> Image {
     let slices = depth.min(MOST_SLICES);
     let rows = slices.div_ceil(COLUMNS);
     let across = COLUMNS * (CELL + GAP) + GAP;
-    let mut sheet = Image::new(across, (rows + 1) * (LINE + CELL + GAP) + GAP);
+    let half = (across - 3 * GAP) / 2;
+    // As high as slices of that width are, but no higher than a cell.
+    let height_of = |room: u32, columns: u32, rows: u32| {
+        let height = u64::from(room) * u64::from(rows) / u64::from(columns);
+        height.clamp(1, u64::from(CELL)) as u32
+    };
+    let tall = height_of(CELL, width, height);
+    let upright = height_of(half, width, depth).max(height_of(half, height, depth));
+    let mut sheet = Image::new(across, rows * (LINE + tall + GAP) + LINE + upright + 2 * GAP);
     sheet.rgba.fill([PAPER, PAPER, PAPER, 1.0]);
 
-    let place = |row: u32| GAP + row * (LINE + CELL + GAP);
+    let place = |row: u32| GAP + row * (LINE + tall + GAP);
     for slice in 0..slices {
         // The middles of equal parts.
         let w = (2 * slice + 1) * depth / (2 * slices);
@@ -52,11 +60,10 @@ pub fn contact_sheet(volume: &Volume) -> Image {
             texel: &|column, row| volume.texel([column, row, w]),
         };
         let left = GAP + slice % COLUMNS * (CELL + GAP);
-        draw(&mut sheet, volume.quantity, &slice_of, [left, place(slice / COLUMNS)], CELL);
+        draw(&mut sheet, volume.quantity, &slice_of, [left, place(slice / COLUMNS)], [CELL, tall]);
     }
-    let half = (across - 3 * GAP) / 2;
     let [u, v] = [width / 2, height / 2];
-    let upright = [
+    let through = [
         Slice {
             label: format!("v {v}/{height}"),
             columns: width,
@@ -70,16 +77,22 @@ pub fn contact_sheet(volume: &Volume) -> Image {
             texel: &|column, row| volume.texel([u, column, row]),
         },
     ];
-    for (slice, left) in upright.iter().zip([GAP, 2 * GAP + half]) {
-        draw(&mut sheet, volume.quantity, slice, [left, place(rows)], half);
+    for (slice, left) in through.iter().zip([GAP, 2 * GAP + half]) {
+        draw(&mut sheet, volume.quantity, slice, [left, place(rows)], [half, upright]);
     }
     sheet
 }
 
-/// Draws a label, and below it a slice as large as fits into `width` pixels and a cell's height.
-fn draw(sheet: &mut Image, quantity: Quantity, slice: &Slice, [left, top]: [u32; 2], width: u32) {
+/// Draws a label, and below it a slice as large as fits into a room of so many pixels.
+fn draw(
+    sheet: &mut Image,
+    quantity: Quantity,
+    slice: &Slice,
+    [left, top]: [u32; 2],
+    [width, height]: [u32; 2],
+) {
     write(sheet, &slice.label, [left, top]);
-    let pixels = (f64::from(width) / f64::from(slice.columns)).min(f64::from(CELL) / f64::from(slice.rows));
+    let pixels = (f64::from(width) / f64::from(slice.columns)).min(f64::from(height) / f64::from(slice.rows));
     let [across, down] =
         [slice.columns, slice.rows].map(|texels| ((f64::from(texels) * pixels) as u32).max(1));
     for y in 0..down {

@@ -35,7 +35,11 @@ impl Filling for Solid<'_> {
     fn cross(&self, part: usize, point: DVec2, tell: &mut dyn FnMut(Turn)) {
         let corners = self.facets[part].corners;
         let [a, b, c] = corners.map(DVec3::truncate);
-        // Those of three that agree are the triangle's own orientation: a ray in it has each edge on the same side.
+        // Seen edge on, two corners in one: no ray that is shifted a little goes through it.
+        if a == b || b == c || c == a {
+            return;
+        }
+        // A ray through the triangle has every edge on the same side.
         let side = is_left(b, c, point);
         if side != is_left(c, a, point) || side != is_left(a, b, point) {
             return;
@@ -49,7 +53,7 @@ impl Filling for Solid<'_> {
         let w = corners.map(|corner| corner.z);
         let (low, high) = (w[0].min(w[1]).min(w[2]), w[0].max(w[1]).max(w[2]));
         let w = (w[0] * weights[0] + w[1] * weights[1] + w[2] * weights[2]) / total;
-        // Seen edge on, all weights are rounding.
+        // Where it is seen nearly edge on, the weights are rounding.
         let w = if w.is_finite() { w.clamp(low, high) } else { 0.5 * (low + high) };
         // Counter-clockwise as seen from above: a ray upward leaves.
         tell(Turn { w, winding: if side { -1 } else { 1 } });
