@@ -120,7 +120,7 @@ fn slab(volume: Volume, height: f64, pixels: u32) -> Result<Scene> {
     let mut scene = Scene::new(shell, Pyramid::build(volume), opacity_distance);
     [scene.view.width, scene.view.height] = [pixels; 2];
     // The slab fills less than the sphere around it.
-    scene.view.camera.fov_y *= 0.85;
+    scene.view.camera.fov_y *= 0.95;
     Ok(scene)
 }
 

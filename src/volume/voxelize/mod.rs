@@ -203,8 +203,7 @@ fn check(options: &Options) -> Result<()> {
             return Err(Error::OutOfMemory { message, help: Some("ask for a smaller size".into()) });
         }
     }
-    // This comparison is false for NaN.
-    if sheet.is_some_and(|thickness| !(thickness > 0.0)) {
+    if sheet.is_some_and(|thickness| thickness.is_nan() || thickness <= 0.0) {
         return Err(Error::Usage { message: "a surface needs a thickness above 0".into(), help: None });
     }
     Ok(())
