@@ -75,7 +75,12 @@ pub fn run(arguments: Arguments, talk: Talk) -> Result<()> {
     let outcome = bench::run(&sweep, &options, &setup);
     bar.bar.finish_and_clear(); // The line is wiped before anything else is said.
     if matches!(outcome, Err(Error::Interrupted)) {
-        talk.warn("what was measured is kept: go on with --resume");
+        let kept = Results::read(&arguments.output.join("results.json"));
+        let is_begun = kept.is_ok_and(|kept| !kept.complete && kept.fingerprint == sweep.fingerprint());
+        talk.warn(match is_begun {
+            true => "what was measured is kept: go on with --resume",
+            false => "nothing was measured yet",
+        });
     }
     let outcome = outcome?;
     for warning in &outcome.warnings {

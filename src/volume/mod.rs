@@ -1,8 +1,10 @@
 //! Volumes: RGBA 3D textures, their files, recipes and mip pyramids.
 
+mod contact;
 mod file;
 mod interpretation;
 mod ktx2_file;
+mod loss;
 mod nrrd;
 mod pyramid;
 mod raw;
@@ -10,10 +12,13 @@ pub mod recipe;
 mod sample;
 mod stack;
 mod transfer;
+pub mod voxelize;
 
-pub use file::{info, read};
+pub use contact::contact_sheet;
+pub use file::{info, is_recipe, read, read_or_make};
 pub use interpretation::Interpretation;
 pub use ktx2_file::{write_raw, write_volume};
+pub use loss::Loss;
 pub use pyramid::Filter;
 pub use raw::{AlphaMode, ChannelRange, RawVolume, VolumeInfo};
 pub use sample::Sample;

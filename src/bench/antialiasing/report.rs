@@ -50,7 +50,7 @@ pub fn html(results: &Results, pictures: &[Pictures]) -> String {
     for (scene, pictures) in results.scenes.iter().zip(pictures) {
         section(&mut page, results, scene, pictures);
     }
-    page += &measured_on(&results.environment);
+    page += &measured_on(&results.environment, &results.sweep.define);
     page + "<section class=\"notes\">\n<h2>How to read it</h2>\n<p>From distance k the eye is k times as far from its target. \
         Level is the median level of detail. Bias is the sum of alpha over the picture as a part of the reference's, less 1: \
         positive where a filter hides too much.</p>\n</section>\n</body>\n</html>\n"

@@ -74,7 +74,8 @@ pub fn choose(
                         "no march meets an error of {max_error:e}: the best, {}, has one of {:.1e}",
                         best.march, best.error.rmse
                     ),
-                    help: Some(format!("accept {:.1e} or more", best.error.upper())),
+                    // A tenth more than written with two digits is never too little.
+                    help: Some(format!("accept {:.1e} or more", 1.1 * best.error.upper())),
                 });
             }
             Next::Try(march) => {

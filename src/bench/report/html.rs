@@ -27,7 +27,7 @@ pub fn page(results: &Results, pictures: &[Pictures]) -> String {
     for (scene, pictures) in results.scenes.iter().zip(pictures) {
         section(&mut page, scene, pictures);
     }
-    page += &measured_on(environment);
+    page += &measured_on(environment, &results.sweep.define);
     page + "<section class=\"notes\">\n<h2>How to read it</h2>\n\
         <p>Time is the wall time of a whole frame, sort and readback included, once the scene is loaded; a first frame is \
         left out. In each round every point of a scene is timed once, so that a machine that drifts hurts all alike. The \
@@ -47,10 +47,11 @@ pub fn head(title: &str) -> String {
     )
 }
 
-/// The section that tells the machine and the program.
-pub fn measured_on(environment: &Environment) -> String {
+/// The section that tells the machine, the program, and what was laid over every scene.
+pub fn measured_on(environment: &Environment, define: &[String]) -> String {
     let mut section = "<section>\n<h2>Measured on</h2>\n<table class=\"facts\">\n".to_owned();
-    for (name, value) in environment.rows() {
+    let defined = (!define.is_empty()).then(|| ("set in every scene", define.join("; ")));
+    for (name, value) in environment.rows().into_iter().chain(defined) {
         let _ = writeln!(section, "<tr><th scope=\"row\">{name}</th><td>{}</td></tr>", escape(&value));
     }
     section + "</table>\n</section>\n"
