@@ -1,6 +1,6 @@
 //! Figures to voxelise: a tree, a chain, a bust and a dragon, sculpted from smoothly joined parts.
 //!
-//! A [`sculpture`] is a field, negative inside; [`tetrahedra`] makes a closed mesh of it. Nothing lights a volume unless it is asked to,
+//! A `sculpture` is a field, negative inside; `tetrahedra` makes a closed mesh of it. Nothing lights a volume unless it is asked to,
 //! so sky light is painted into the colours.
 
 mod bust;
