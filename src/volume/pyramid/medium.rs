@@ -5,7 +5,7 @@
 //!
 //! ```text
 //!   D(a) = -ln(1 - a)                      of an opacity, infinite for 1;  D(a) = a of an extinction
-//!   E(a, t) = (1 - exp(-D(a) t)) / a       and E(0, t) = t: a glow without opacity
+//!   E(a, t) = (1 - exp(-D(a) t)) / a       nothing where a is 0
 //! ```
 
 use crate::volume::Quantity;
@@ -22,10 +22,10 @@ pub struct Passage {
 impl Passage {
     /// Through a texel over a length.
     pub fn through(texel: [f64; 4], length: f64, quantity: Quantity) -> Self {
-        if texel == [0.0; 4] {
-            return Self::default(); // as the formulas say, but most of many volumes is empty
-        }
         let [red, green, blue, alpha] = texel;
+        if alpha == 0.0 {
+            return Self::default();
+        }
         let emission = emission(alpha, length, quantity);
         let light = [red, green, blue].map(|colour| colour * emission);
         Self { depth: depth(alpha, quantity) * length, light }
@@ -37,8 +37,11 @@ impl Passage {
             Quantity::Opacity => opacity(self.depth / length),
             Quantity::Extinction => self.depth / length,
         };
+        if alpha == 0.0 {
+            return [0.0; 4];
+        }
         // Not `E(alpha, length)`: what is so dense that alpha rounds to 1 is no wall yet.
-        let emission = if alpha == 0.0 { length } else { opacity(self.depth) / alpha };
+        let emission = opacity(self.depth) / alpha;
         let [red, green, blue] = self.light.map(|light| light / emission);
         [red, green, blue, alpha]
     }
@@ -81,7 +84,6 @@ pub fn depth(alpha: f64, quantity: Quantity) -> f64 {
 
 fn emission(alpha: f64, length: f64, quantity: Quantity) -> f64 {
     match quantity {
-        _ if alpha == 0.0 => length,
         Quantity::Opacity if length == 1.0 => 1.0,
         _ => opacity(depth(alpha, quantity) * length) / alpha,
     }

@@ -148,7 +148,6 @@ mod tests {
             [0.1, 0.2, 0.3, 0.4],
             [3.0, 0.0, 0.5, 1.0],
             [1e-7, 0.0, 0.0, 1e-7],
-            [1.5, 0.0, 3.0, 0.0],
             [0.0; 4],
         ] {
             for size in [[8, 8, 8], [5, 3, 7], [1, 1, 1]] {
@@ -156,7 +155,6 @@ mod tests {
                     let texels = vec![texel; size.iter().product::<u32>() as usize];
                     for (filter, pyramid) in pyramids(&Volume::of(quantity, size, texels).unwrap()) {
                         for found in pyramid.levels.iter().flat_map(|level| &level.texels) {
-                            println!("{filter:?} {quantity:?}");
                             assert_near(*found, texel, ROUNDING);
                             assert_eq!(
                                 (found[3] == 0.0, found[3] == 1.0),

@@ -111,14 +111,6 @@ mod tests {
     }
 
     #[test]
-    fn a_glow_without_opacity_is_gathered_and_stays_finite() {
-        let glow = [1.5, 0.0, 3.0, 0.0];
-        assert_eq!(top(&paper(column(&[glow; 4]))), glow);
-        assert_eq!(top(&paper(column(&[[0.0, 0.0, 0.0, 1.0], glow]))), [1.5, 0.0, 3.0, 1.0]);
-        assert_eq!(top(&paper(column(&[[f32::MAX, 0.0, 0.0, 1.0], [f32::MAX, 0.0, 0.0, 0.0]])))[0], f32::MAX);
-    }
-
-    #[test]
     fn an_opaque_layer_hides_what_is_below_it() {
         let (red, blue) = ([1.0, 0.0, 0.0, 1.0], [0.0, 0.0, 1.0, 1.0]);
         assert_eq!(top(&paper(column(&[blue, red]))), red);
