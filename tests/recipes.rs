@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use mesoshell::volume::{Volume, recipe};
 use mesoshell::{Error, Result};
 
-const NAMES: [&str; 5] = ["clouds", "fog", "fur", "rocks", "weave"];
+const NAMES: [&str; 6] = ["chain-mail", "clouds", "fog", "fur", "rocks", "weave"];
 
 fn shipped(name: &str) -> recipe::Recipe {
     let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("volumes").join(name).with_extension("toml");
@@ -42,7 +42,7 @@ fn shipped_recipes_are_sound_and_quick() {
         let slice = 128 * 128;
         let largest = volume.texels.iter().map(|texel| texel[3]).fold(0., f32::max);
         match name {
-            "rocks" | "weave" => assert_eq!(largest, 1., "{name} is not solid"),
+            "chain-mail" | "rocks" | "weave" => assert_eq!(largest, 1., "{name} is not solid"),
             _ => assert!((0.1..0.98).contains(&largest), "{name}: alpha {largest}"),
         }
         let outer = &volume.texels[volume.texels.len() - slice..];
@@ -144,6 +144,8 @@ fn extreme_keys_make_sound_volumes() {
             "fur",
             "length = 0.05\nthickness = 0.0005\ntaper = 1\ncurl = 0\nlean = 0\nclumps = 256\nopacity = 0.98",
         ),
+        ("chain-mail", "rings = 128\nwire = 0.22\nvariation = 1\ntarnish = 1\nshine = 1\nheight = 4"),
+        ("chain-mail", "rings = 1\nwire = 0.08\nshine = 0\nocclusion = 1\nbacking = 0\nheight = 0.01"),
         ("weave", "pairs = 256\nwidth = 1\nroundness = 1\ntwist = 256\nfibres = 1\nvariation = 1"),
         ("weave", "pairs = 1\nwidth = 0.1\nroundness = 0.1\ntwist = 0\nheight = 0.01"),
         (
@@ -195,7 +197,7 @@ fn mistakes_are_underlined() {
     assert_underlined(&format!("{fur}tip_colour = [1, "), "-1", ", 0]", "`tip_colour`: invalid value");
     assert_underlined(&format!("{fur}tip_colour = "), "[1, 0, 0, 1]", "", "`tip_colour`: invalid length");
     assert_underlined(&format!("{fur}height = "), "9", "", "`height`");
-    assert_underlined("recipe = ", "\"grass\"", "", "there is no recipe \"grass\"");
+    assert_underlined("recipe = ", "\"moss\"", "", "there is no recipe \"moss\"");
     for size in ["[1, 2]", "[1, 2, 3, 4]"] {
         assert_underlined("recipe = \"fog\"\nsize = ", size, "", "expected a list of 3");
     }

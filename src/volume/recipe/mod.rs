@@ -11,6 +11,7 @@
 //! `"#rrggbb"` (sRGB) or `[red, green, blue]` (linear): see [`Colour`](crate::value::Colour). A recipe
 //! yields the same bytes whatever the number of threads, and its volume repeats in u and v without a seam.
 
+mod chain_mail;
 mod clouds;
 mod fog;
 mod fur;
@@ -30,6 +31,7 @@ use miette::NamedSource;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue, ValueDeserializer};
 
+pub use chain_mail::ChainMail;
 pub use clouds::Clouds;
 pub use fog::Fog;
 pub use fur::Fur;
@@ -47,6 +49,7 @@ pub const MAX_TEXELS: u64 = 1 << 28;
 
 /// Every recipe, by the name that a file calls it.
 const RECIPES: &[(&str, Reader)] = &[
+    ("chain-mail", read_pattern::<ChainMail>),
     ("clouds", read_pattern::<Clouds>),
     ("fog", read_pattern::<Fog>),
     ("fur", read_pattern::<Fur>),
