@@ -6,7 +6,8 @@ use std::time::{Duration, Instant};
 use mesoshell::volume::{Volume, recipe};
 use mesoshell::{Error, Result};
 
-const NAMES: [&str; 6] = ["chain-mail", "clouds", "fog", "fur", "rocks", "weave"];
+const NAMES: [&str; 9] =
+    ["chain-mail", "clouds", "ellipsoids", "fog", "fur", "grass", "rocks", "scales", "weave"];
 
 fn shipped(name: &str) -> recipe::Recipe {
     let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("volumes").join(name).with_extension("toml");
@@ -42,7 +43,9 @@ fn shipped_recipes_are_sound_and_quick() {
         let slice = 128 * 128;
         let largest = volume.texels.iter().map(|texel| texel[3]).fold(0., f32::max);
         match name {
-            "chain-mail" | "rocks" | "weave" => assert_eq!(largest, 1., "{name} is not solid"),
+            "chain-mail" | "grass" | "rocks" | "scales" | "weave" => {
+                assert_eq!(largest, 1., "{name} is not solid")
+            }
             _ => assert!((0.1..0.98).contains(&largest), "{name}: alpha {largest}"),
         }
         let outer = &volume.texels[volume.texels.len() - slice..];
@@ -110,8 +113,12 @@ fn seam(volume: &Volume, axis: usize, last: u32) -> f64 {
 #[test]
 fn volumes_repeat_without_a_seam() {
     for name in NAMES {
-        // Strands of about a voxel differ so much from texel to texel that no seam shows: thicker ones.
-        let keys = if name == "fur" { "thickness = 0.03\ndensity = 200" } else { "" };
+        // Hairs and blades of about a voxel differ so much from texel to texel that no seam shows: thicker ones.
+        let keys = match name {
+            "fur" => "thickness = 0.03\ndensity = 200",
+            "grass" => "width = 0.05\nflatness = 0\ndensity = 60",
+            _ => "",
+        };
         let volume = recipe::parse("test", &format!("recipe = \"{name}\"\n{keys}")).unwrap().build().unwrap();
         for axis in 0..2 {
             let right = seam(&volume, axis, 127);
@@ -146,6 +153,32 @@ fn extreme_keys_make_sound_volumes() {
         ),
         ("chain-mail", "rings = 128\nwire = 0.22\nvariation = 1\ntarnish = 1\nshine = 1\nheight = 4"),
         ("chain-mail", "rings = 1\nwire = 0.08\nshine = 0\nocclusion = 1\nbacking = 0\nheight = 0.01"),
+        (
+            "scales",
+            "scales = 128\noverlap = 5\noutline = 8\nthickness = 1\nlift = 1\ndome = 1\nridge = 2\nshine = 1",
+        ),
+        (
+            "scales",
+            "scales = 1\noverlap = 2.2\noutline = 1\nthickness = 0.05\nlift = 0\ndome = 0\nheight = 0.01",
+        ),
+        (
+            "ellipsoids",
+            "count = 2000\nlargest = 0.3\nsmallest = 0.005\nelongation = 0.9\nrim = 1\nheight = 4",
+        ),
+        (
+            "ellipsoids",
+            "largest = 0.01\nsmallest = 0.3\nalpha = 0.9999999\nmedium_alpha = 0.9999999\nmedium_contrast = 1",
+        ),
+        ("ellipsoids", "count = 0\nalpha = 0\nmedium_alpha = 0\nheight = 0.01"),
+        (
+            "grass",
+            "density = 3000\nlength_variation = 1\nwidth = 0.05\nflatness = 0.9\ntaper = 1\nbend = 85\nwind = 1",
+        ),
+        (
+            "grass",
+            "length = 0.05\nwidth = 0.001\ntaper = 0\nbend = 0\nwind = 0\ntufts = 256\ntufting = 1\nheight = 0.01",
+        ),
+        ("grass", "density = 0"),
         ("weave", "pairs = 256\nwidth = 1\nroundness = 1\ntwist = 256\nfibres = 1\nvariation = 1"),
         ("weave", "pairs = 1\nwidth = 0.1\nroundness = 0.1\ntwist = 0\nheight = 0.01"),
         (

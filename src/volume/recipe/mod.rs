@@ -13,12 +13,16 @@
 
 mod chain_mail;
 mod clouds;
+mod ellipsoids;
 mod fog;
 mod fur;
+mod grass;
 mod grid;
 mod keys;
 mod noise;
 mod rocks;
+mod scales;
+mod strand;
 mod weave;
 
 use std::collections::BTreeMap;
@@ -33,9 +37,12 @@ use toml::de::{DeTable, DeValue, ValueDeserializer};
 
 pub use chain_mail::ChainMail;
 pub use clouds::Clouds;
+pub use ellipsoids::Ellipsoids;
 pub use fog::Fog;
 pub use fur::Fur;
+pub use grass::Grass;
 pub use rocks::Rocks;
+pub use scales::Scales;
 pub use weave::Weave;
 
 use super::{Quantity, Volume};
@@ -51,9 +58,12 @@ pub const MAX_TEXELS: u64 = 1 << 28;
 const RECIPES: &[(&str, Reader)] = &[
     ("chain-mail", read_pattern::<ChainMail>),
     ("clouds", read_pattern::<Clouds>),
+    ("ellipsoids", read_pattern::<Ellipsoids>),
     ("fog", read_pattern::<Fog>),
     ("fur", read_pattern::<Fur>),
+    ("grass", read_pattern::<Grass>),
     ("rocks", read_pattern::<Rocks>),
+    ("scales", read_pattern::<Scales>),
     ("weave", read_pattern::<Weave>),
 ];
 
