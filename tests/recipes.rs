@@ -6,17 +6,21 @@ use std::time::{Duration, Instant};
 use mesoshell::volume::{Volume, recipe};
 use mesoshell::{Error, Result};
 
-const NAMES: [&str; 9] =
-    ["chain-mail", "clouds", "ellipsoids", "fog", "fur", "grass", "rocks", "scales", "weave"];
+const NAMES: [&str; 10] =
+    ["chain-mail", "clouds", "ellipsoids", "fog", "fur", "grass", "height-map", "rocks", "scales", "weave"];
 
 fn shipped(name: &str) -> recipe::Recipe {
     let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("volumes").join(name).with_extension("toml");
     recipe::load(path).unwrap_or_else(|error| panic!("{error}"))
 }
 
+fn recipe_of(name: &str, keys: &str) -> recipe::Recipe {
+    let image = if name == "height-map" { "image = \"volumes/letters.png\"" } else { "" };
+    recipe::parse("test", &format!("recipe = \"{name}\"\n{image}\n{keys}")).unwrap()
+}
+
 fn small(name: &str, keys: &str) -> Volume {
-    let recipe = recipe::parse("test", &format!("recipe = \"{name}\"\n{keys}")).unwrap();
-    recipe.build_with_size([40, 36, 12]).unwrap()
+    recipe_of(name, keys).build_with_size([40, 36, 12]).unwrap()
 }
 
 fn assert_sound(volume: &Volume, name: &str) {
@@ -43,7 +47,7 @@ fn shipped_recipes_are_sound_and_quick() {
         let slice = 128 * 128;
         let largest = volume.texels.iter().map(|texel| texel[3]).fold(0., f32::max);
         match name {
-            "chain-mail" | "grass" | "rocks" | "scales" | "weave" => {
+            "chain-mail" | "grass" | "height-map" | "rocks" | "scales" | "weave" => {
                 assert_eq!(largest, 1., "{name} is not solid")
             }
             _ => assert!((0.1..0.98).contains(&largest), "{name}: alpha {largest}"),
@@ -117,13 +121,16 @@ fn volumes_repeat_without_a_seam() {
         let keys = match name {
             "fur" => "thickness = 0.03\ndensity = 200",
             "grass" => "width = 0.05\nflatness = 0\ndensity = 60",
+            // The stems of letters are steps, too.
+            "height-map" => "softness = 0.1",
             _ => "",
         };
-        let volume = recipe::parse("test", &format!("recipe = \"{name}\"\n{keys}")).unwrap().build().unwrap();
+        let volume = recipe_of(name, keys).build().unwrap();
         for axis in 0..2 {
             let right = seam(&volume, axis, 127);
             assert!(right <= 1.1, "{name}: a seam of {right} across axis {axis}");
-            let wrong = seam(&volume, axis, 70);
+            // Two wrong places, since letters have a margin in one of them, too.
+            let wrong = seam(&volume, axis, 70).max(seam(&volume, axis, 96));
             assert!(wrong > 1.5, "{name}: a border in the wrong place gives only {wrong} across axis {axis}");
         }
     }
@@ -179,6 +186,8 @@ fn extreme_keys_make_sound_volumes() {
             "length = 0.05\nwidth = 0.001\ntaper = 0\nbend = 0\nwind = 0\ntufts = 256\ntufting = 1\nheight = 0.01",
         ),
         ("grass", "density = 0"),
+        ("height-map", "black = 0.95\nwhite = 0.02\nsoftness = 0.25\ngrain = 1\nocclusion = 1"),
+        ("height-map", "black = 0.5\nwhite = 0.5\nheight = 0.01"),
         ("weave", "pairs = 256\nwidth = 1\nroundness = 1\ntwist = 256\nfibres = 1\nvariation = 1"),
         ("weave", "pairs = 1\nwidth = 0.1\nroundness = 0.1\ntwist = 0\nheight = 0.01"),
         (
@@ -236,6 +245,32 @@ fn mistakes_are_underlined() {
     }
     assert_underlined("recipe = \"fog\"\nseed = ", "-1", "", "`seed`");
     assert_underlined("", "", "seed = 1", "`recipe`");
+}
+
+#[test]
+fn an_image_is_relative_to_its_recipe_and_must_be_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let toml = folder.path().join("relief.toml");
+    let load = |image: &str| {
+        std::fs::write(&toml, format!("recipe = \"height-map\"\nimage = \"{image}\"")).unwrap();
+        recipe::load(&toml)
+    };
+    std::fs::write(folder.path().join("text.png"), "no picture").unwrap();
+    for image in ["nowhere.png", "text.png", "."] {
+        let Err(Error::Input { path, .. }) = load(image) else { panic!("{image} is taken") };
+        assert_eq!(path, folder.path().join(image));
+    }
+    assert!(matches!(load(""), Err(Error::Text { .. })));
+
+    // Black on the left, white on the right: as high as the keys say, as long as no edge is near.
+    let image = image::GrayImage::from_fn(8, 8, |x, _| image::Luma([if x < 4 { 0 } else { 255 }]));
+    image.save(folder.path().join("step.png")).unwrap();
+    let volume = load("step.png").unwrap().build_with_size([32, 32, 20]).unwrap();
+    for (u, height) in [(8, 0.3), (24, 0.9)] {
+        let filled: f32 = (0..20).map(|w| volume.texel([u, 16, w])[3]).sum();
+        // A smooth edge has its middle where the sharp one is, but for the steps of the grid.
+        assert!((filled / 20. - height).abs() < 0.5 / 20., "{filled} of 20 at {height}");
+    }
 }
 
 #[test]
