@@ -6,8 +6,19 @@ use std::time::{Duration, Instant};
 use mesoshell::volume::{Volume, recipe};
 use mesoshell::{Error, Result};
 
-const NAMES: [&str; 10] =
-    ["chain-mail", "clouds", "ellipsoids", "fog", "fur", "grass", "height-map", "rocks", "scales", "weave"];
+const NAMES: [&str; 11] = [
+    "chain-mail",
+    "clouds",
+    "ellipsoids",
+    "fog",
+    "fur",
+    "grass",
+    "height-map",
+    "rocks",
+    "scales",
+    "trees",
+    "weave",
+];
 
 fn shipped(name: &str) -> recipe::Recipe {
     let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("volumes").join(name).with_extension("toml");
@@ -47,7 +58,7 @@ fn shipped_recipes_are_sound_and_quick() {
         let slice = 128 * 128;
         let largest = volume.texels.iter().map(|texel| texel[3]).fold(0., f32::max);
         match name {
-            "chain-mail" | "grass" | "height-map" | "rocks" | "scales" | "weave" => {
+            "chain-mail" | "grass" | "height-map" | "rocks" | "scales" | "trees" | "weave" => {
                 assert_eq!(largest, 1., "{name} is not solid")
             }
             _ => assert!((0.1..0.98).contains(&largest), "{name}: alpha {largest}"),
@@ -188,6 +199,15 @@ fn extreme_keys_make_sound_volumes() {
         ("grass", "density = 0"),
         ("height-map", "black = 0.95\nwhite = 0.02\nsoftness = 0.25\ngrain = 1\nocclusion = 1"),
         ("height-map", "black = 0.5\nwhite = 0.5\nheight = 0.01"),
+        (
+            "trees",
+            "count = 500\ncrown = 0.3\nvariation = 0.9\noverlap = 0.9\nblobs = 100\nraggedness = 1\ntrunk = 0.7",
+        ),
+        (
+            "trees",
+            "count = 3\ncrown = 0.01\nconifers = 1\nblobs = 1\nraggedness = 0\ntrunk = 0\nheight = 0.01",
+        ),
+        ("trees", "count = 0\nheight = 4"),
         ("weave", "pairs = 256\nwidth = 1\nroundness = 1\ntwist = 256\nfibres = 1\nvariation = 1"),
         ("weave", "pairs = 1\nwidth = 0.1\nroundness = 0.1\ntwist = 0\nheight = 0.01"),
         (

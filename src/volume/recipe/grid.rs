@@ -123,7 +123,7 @@ pub(super) fn lay_over(texel: &mut [f32; 4], colour: Vec3, alpha: f32) {
     }
 }
 
-/// `colour` laid over a premultiplied texel, whose alpha grows to no more than `alpha`: thin things that crowd
+/// `colour` laid over a premultiplied texel, whose alpha grows to no more than `alpha`: things that crowd
 /// share a voxel, and the edge of the crowd is as soft as theirs.
 pub(super) fn lay_among(texel: &mut [f32; 4], colour: Vec3, alpha: f32) {
     let fullest = texel[3].max(alpha);

@@ -24,6 +24,7 @@ mod noise;
 mod rocks;
 mod scales;
 mod strand;
+mod trees;
 mod weave;
 
 use std::collections::BTreeMap;
@@ -45,6 +46,7 @@ pub use grass::Grass;
 pub use height_map::HeightMap;
 pub use rocks::Rocks;
 pub use scales::Scales;
+pub use trees::Trees;
 pub use weave::Weave;
 
 use super::{Quantity, Volume};
@@ -67,6 +69,7 @@ const RECIPES: &[(&str, Reader)] = &[
     ("height-map", |source, table| Ok(Arc::new(height_map::read(source, table)?))),
     ("rocks", read_pattern::<Rocks>),
     ("scales", read_pattern::<Scales>),
+    ("trees", read_pattern::<Trees>),
     ("weave", read_pattern::<Weave>),
 ];
 
