@@ -43,7 +43,7 @@ pub struct Sample {
 }
 
 impl Sample {
-    /// Draws one pixel at random from each of [`PIXELS`] stretches of the picture's rows, the same ones every time, and
+    /// Draws one pixel at random from each of 8192 stretches of the picture's rows, the same ones every time, and
     /// integrates there.
     ///
     /// # Errors
