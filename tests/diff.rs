@@ -90,7 +90,7 @@ fn every_metric_has_its_threshold() {
         assert_eq!(at(value), Some(0), "{metric} at its threshold");
         assert_eq!(at(1.001 * value), Some(i32::from(larger_is_better)), "{metric}");
         assert_eq!(at(0.999 * value), Some(i32::from(!larger_is_better)), "{metric}");
-        assert_eq!(at(f64::NAN), Some(1), "{metric}");
+        assert_eq!(at(f64::NAN), Some(2), "{metric}");
     }
     assert_eq!(code("--threshold 0.0625"), Some(0), "rmse is the default");
     assert_eq!(code("--threshold 0.0624"), Some(1), "rmse is the default");
