@@ -144,16 +144,11 @@ mod tests {
 
     #[test]
     fn a_constant_volume_stays_constant() {
-        for texel in [
-            [0.1, 0.2, 0.3, 0.4],
-            [3.0, 0.0, 0.5, 1.0],
-            [1e-7, 0.0, 0.0, 1e-7],
-            [0.0; 4],
-        ] {
+        for texel in [[0.1, 0.2, 0.3, 0.4], [3.0, 0.0, 0.5, 1.0], [1e-7, 0.0, 0.0, 1e-7], [0.0; 4]] {
             for size in [[8, 8, 8], [5, 3, 7], [1, 1, 1]] {
                 for quantity in [Quantity::Opacity, Quantity::Extinction] {
                     let texels = vec![texel; size.iter().product::<u32>() as usize];
-                    for (filter, pyramid) in pyramids(&Volume::of(quantity, size, texels).unwrap()) {
+                    for (_, pyramid) in pyramids(&Volume::of(quantity, size, texels).unwrap()) {
                         for found in pyramid.levels.iter().flat_map(|level| &level.texels) {
                             assert_near(*found, texel, ROUNDING);
                             assert_eq!(
