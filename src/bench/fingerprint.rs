@@ -7,15 +7,16 @@ use bytemuck::NoUninit;
 use serde::{Deserialize, Serialize};
 
 use crate::reference::TOLERANCE;
-use crate::scene::{Medium, Scene, View};
+use crate::scene::{Light, Medium, Model, Scene, Shading, Source, View};
 use crate::volume::Quantity;
 
 /// The code that a cached reference comes from: were it changed, so might its pictures be.
-const REFERENCE_CODE: [(&str, &str); 5] = [
+const REFERENCE_CODE: [(&str, &str); 6] = [
     ("crossing.rs", include_str!("../reference/crossing.rs")),
     ("integrate.rs", include_str!("../reference/integrate.rs")),
     ("mod.rs", include_str!("../reference/mod.rs")),
     ("quadrature.rs", include_str!("../reference/quadrature.rs")),
+    ("shade.rs", include_str!("../reference/shade.rs")),
     ("texture.rs", include_str!("../reference/texture.rs")),
 ];
 
@@ -59,7 +60,7 @@ impl Fingerprint {
         Builder(blake3::Hasher::new()).bytes(kind.as_bytes())
     }
 
-    /// Of everything that the reference's picture of `view` depends on: geometry, texture, medium, camera, and the
+    /// Of everything that the reference's picture of `view` depends on: geometry, texture, medium, light, camera, and the
     /// reference itself. How finely a method marches is not among it.
     pub fn of_reference(scene: &Scene, view: &View) -> Self {
         let mut builder = Self::builder("reference").bytes(env!("CARGO_PKG_VERSION").as_bytes());
@@ -85,17 +86,53 @@ impl Fingerprint {
             };
             builder = builder.bytes(quantity.as_bytes()).numbers(&level.size).numbers(&level.texels);
         }
-        builder.finish()
+        match &scene.shading {
+            Some(shading) => builder.bytes(b"lit").shading(scene, shading),
+            None => builder,
+        }
+        .finish()
+    }
+}
+
+impl Builder {
+    fn shading(self, scene: &Scene, shading: &Shading) -> Self {
+        let Shading { model, ambient, diffuse, specular, shininess, lights, directions } = shading;
+        let model_name = match model {
+            Model::Surface => "surface",
+            Model::Fibre => "fibre",
+        };
+        let frames = scene.shell.frames(model.frame_kind());
+        let mut builder = self
+            .bytes(model_name.as_bytes())
+            .numbers(&[*ambient])
+            .numbers(&[*diffuse, *specular, *shininess])
+            .numbers(&frames.maps)
+            .numbers(&frames.of_vertices);
+        for Light { source, colour } in lights {
+            builder = match source {
+                Source::Directional { towards } => builder.bytes(b"directional").numbers(&[*towards]),
+                Source::Point { position, falloff } => {
+                    builder.bytes(b"point").numbers(&[*position]).numbers(&[falloff.unwrap_or(f64::INFINITY)])
+                }
+            }
+            .numbers(&[*colour]);
+        }
+        for level in &directions.levels {
+            builder = builder.numbers(&level.size).numbers(&level.texels);
+        }
+        builder
     }
 }
 
 #[cfg(test)]
 pub(crate) mod tests {
+    use glam::DVec3;
+
     use super::*;
     use crate::mesh::generate::{Generator, Torus};
     use crate::scene::March;
     use crate::shell::{Shell, ShellOptions};
-    use crate::volume::{Pyramid, Volume};
+    use crate::volume::{Directions, Pyramid, Volume};
 
     /// A torus of fog in 32 x 32 pixels.
     pub(crate) fn scene() -> Scene {
@@ -139,6 +176,60 @@ pub(crate) mod tests {
         }
         let finer = Scene { march: March::Paper { samples: 3 }, ..scene() };
         assert_eq!(original, print(&finer));
+    }
+
+    /// The same under a lamp and the sun.
+    fn lit() -> Scene {
+        let scene = scene();
+        let sun = Source::Directional { towards: DVec3::Y };
+        let lamp = Source::Point { position: DVec3::X, falloff: None };
+        let shading = Shading {
+            model: Model::Surface,
+            ambient: DVec3::splat(0.1),
+            diffuse: 1.0,
+            specular: 0.5,
+            shininess: 20.0,
+            lights: [sun, lamp].map(|source| Light { source, colour: DVec3::ONE }).to_vec(),
+            directions: Directions::normals(&scene.volume.levels[0]),
+        };
+        Scene { shading: Some(shading), ..scene }
+    }
+
+    /// A change of the light, and its name for the failure's sake.
+    type Relight = (&'static str, fn(&mut Shading));
+
+    const LIGHTS: &[Relight] = &[
+        ("the model", |shading| shading.model = Model::Fibre),
+        ("ambient light", |shading| shading.ambient.y += 1e-9),
+        ("the diffuse factor", |shading| shading.diffuse = 0.5),
+        ("the specular factor", |shading| shading.specular = 1.0),
+        ("the shininess", |shading| shading.shininess += 1e-9),
+        ("a light's direction", |shading| {
+            shading.lights[0].source = Source::Directional { towards: DVec3::X };
+        }),
+        ("a light's position", |shading| {
+            shading.lights[1].source = Source::Point { position: DVec3::Y, falloff: None };
+        }),
+        ("a light's falloff", |shading| {
+            shading.lights[1].source = Source::Point { position: DVec3::X, falloff: Some(1.0) };
+        }),
+        ("a light's colour", |shading| shading.lights[1].colour.z = 0.5),
+        ("a light less", |shading| shading.lights.truncate(1)),
+        ("a normal", |shading| shading.directions.levels[0].texels[3][1] += 1e-6),
+        ("a coarser normal", |shading| shading.directions.levels[1].texels[0][2] += 1e-6),
+    ];
+
+    #[test]
+    fn every_change_of_the_light_is_seen() {
+        let print = |scene: &Scene| Fingerprint::of_reference(scene, &scene.view);
+        let original = print(&lit());
+        assert_ne!(original, print(&scene()), "unlit");
+        assert_eq!(original, print(&lit()));
+        for (name, change) in LIGHTS {
+            let mut changed = lit();
+            change(changed.shading.as_mut().unwrap());
+            assert_ne!(original, print(&changed), "{name}");
+        }
     }
 
     #[test]

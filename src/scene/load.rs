@@ -7,6 +7,7 @@ use toml::Spanned;
 
 use super::camera::DEFAULT_NEAR;
 use super::file::{CameraSection, DensitySection, MeshSection, Plan, SceneFile, VolumeSection};
+use super::lighting::Lighting;
 use super::text::Text;
 use super::{Camera, March, Medium, Scene, Sizes, View, span};
 use crate::frame::{Stage, Stopwatch};
@@ -80,6 +81,7 @@ fn build(
     let camera = file.camera.as_ref().map(|section| camera(text, section)).transpose()?;
     let mesh = MeshSource::of(text, &file.mesh)?;
     let volume = VolumeSource::of(text, &file.volume, base_dir)?;
+    let lighting = Lighting::of(text, &file, base_dir)?;
     let [width, height] = file.image.size.0.map(|pixels| pixels.0);
     let admit = |volume| admit(&Sizes { picture: [width, height], volume });
     if let VolumeSource::Recipe(recipe) = &volume {
@@ -100,6 +102,10 @@ fn build(
         uv_offset: DVec2::from_array(shell.uv_offset.0.map(|x| x.0)),
     };
     let shell = Shell::build(&mesh, &options)?;
+    let camera = camera.unwrap_or_else(|| Camera::framing(&shell.vertices));
+    if let Some(lighting) = &lighting {
+        lighting.check_camera(text, &camera)?;
+    }
     stopwatch.lap("load.shell");
 
     progress.stage("loading the volume");
@@ -120,11 +126,18 @@ fn build(
     let texel_along_w = options.thickness / f64::from(volume.size[2]);
     stopwatch.lap("load.volume");
 
+    let shading = lighting.map(|lighting| {
+        progress.stage("finding the volume's directions");
+        let shading = lighting.shade(&volume);
+        stopwatch.lap("load.directions");
+        shading
+    });
+    let shading = shading.transpose()?;
+
     progress.stage("filtering the volume");
     let volume = Pyramid::build(volume);
     stopwatch.lap("load.pyramid");
 
-    let camera = camera.unwrap_or_else(|| Camera::framing(&shell.vertices));
     let scene = Scene {
         view: View { camera, width, height, depth: false },
         medium: Medium {
@@ -138,6 +151,7 @@ fn build(
             Plan::Paper => March::Paper { samples: file.march.samples.0 },
             Plan::Exact => March::Exact,
         },
+        shading,
         shell,
         volume,
     };

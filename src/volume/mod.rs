@@ -1,5 +1,6 @@
 //! Volumes: RGBA 3D textures, their files, recipes and mip pyramids.
 
+mod directions;
 mod file;
 mod interpretation;
 mod ktx2_file;
@@ -11,6 +12,7 @@ mod sample;
 mod stack;
 mod transfer;
 
+pub use directions::{DirectionLevel, Directions};
 pub use file::{info, read};
 pub use interpretation::Interpretation;
 pub use ktx2_file::{write_raw, write_volume};

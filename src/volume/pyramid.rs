@@ -100,7 +100,7 @@ fn merged_column(finer: &Volume, [u, v]: [u32; 2], coarse_w: u32, thickness: f64
 
 /// The fine texels that coarse texel `coarse` of an axis of `fine_size` covers, each with the part, in (0, 1],
 /// of it that is covered.
-fn coverage(fine_size: u32, coarse: u32) -> impl DoubleEndedIterator<Item = (u32, f64)> {
+pub(super) fn coverage(fine_size: u32, coarse: u32) -> impl DoubleEndedIterator<Item = (u32, f64)> {
     let coarse_size = f64::from((fine_size / 2).max(1));
     let (count, weights) = match fine_size {
         1 => (1, [1.0; 3]),
@@ -111,7 +111,7 @@ fn coverage(fine_size: u32, coarse: u32) -> impl DoubleEndedIterator<Item = (u32
 }
 
 /// The length of a coarse texel in fine ones: the sum of the weights of its [`coverage`].
-fn texels_per_coarse(fine_size: u32) -> f64 {
+pub(super) fn texels_per_coarse(fine_size: u32) -> f64 {
     f64::from(fine_size) / f64::from((fine_size / 2).max(1))
 }
 
