@@ -86,13 +86,18 @@ const LIT: [Spirv; 4] = [
 fn structs_of_lit_scenes_agree() {
     for shader in LIT {
         let (members, stride) = layout(shader, "LitCell");
-        assert_eq!((members, stride), (host!(LitCell: frames, per_height), Some(size_of::<LitCell>() as u32)));
+        assert_eq!(
+            (members, stride),
+            (host!(LitCell: frames, per_height), Some(size_of::<LitCell>() as u32))
+        );
         let (members, stride) = layout(shader, "Frame");
         assert_eq!((members, stride), (host!(Frame: columns), Some(size_of::<Frame>() as u32)));
         let (members, stride) = layout(shader, "LightSource");
-        assert_eq!((members, stride), (host!(LightSource: place, colour), Some(size_of::<LightSource>() as u32)));
-        let mut lighting =
-            host!(Lighting: world_from_view, ambient, diffuse, specular, shininess, count);
+        assert_eq!(
+            (members, stride),
+            (host!(LightSource: place, colour), Some(size_of::<LightSource>() as u32))
+        );
+        let mut lighting = host!(Lighting: world_from_view, ambient, diffuse, specular, shininess, count);
         lighting.push(("sources".to_owned(), size_of::<Lighting>() as u32));
         assert_eq!(layout(shader, "Lighting").0, lighting);
     }

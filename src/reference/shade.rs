@@ -77,8 +77,7 @@ impl<'a> Lit<'a> {
         let in_texture = DVec3::new(x, y, z);
         let frame = surroundings.frame_at_eye + depth * surroundings.frame_per_depth;
         let direction = (frame * in_texture).normalize_or_zero();
-        let agreement =
-            if direction == DVec3::ZERO { 0.0 } else { (in_texture.length() / weight).min(1.0) };
+        let agreement = if direction == DVec3::ZERO { 0.0 } else { (in_texture.length() / weight).min(1.0) };
         let (mut scattered, mut mirrored) = (*ambient, DVec3::ZERO);
         for light in lights {
             let (arriving, to_light) = arriving(light, point);
@@ -114,7 +113,8 @@ fn arriving(light: &Light, point: DVec3) -> (DVec3, DVec3) {
         Source::Directional { towards } => (light.colour, towards),
         Source::Point { position, falloff } => {
             let way = position - point;
-            let left = falloff.map_or(1.0, |falloff| 1.0 / (1.0 + way.length_squared() / (falloff * falloff)));
+            let left =
+                falloff.map_or(1.0, |falloff| 1.0 / (1.0 + way.length_squared() / (falloff * falloff)));
             (left * light.colour, way.normalize_or_zero())
         }
     }

@@ -33,9 +33,8 @@ impl<'a> Lighting<'a> {
     pub fn of(text: &Text, file: &'a SceneFile, base_dir: &Path) -> Result<Option<Self>> {
         let Some(section) = &file.shading else {
             return match file.light.first() {
-                Some(light) => {
-                    Err(text.error(light.span(), "a [[light]] needs a section [shading] that says how it is seen"))
-                }
+                Some(light) => Err(text
+                    .error(light.span(), "a [[light]] needs a section [shading] that says how it is seen")),
                 None => Ok(None),
             };
         };
@@ -52,17 +51,21 @@ impl<'a> Lighting<'a> {
                 stored.as_ref().map(|file| base_dir.join(file.get_ref()))
             }
             (Model::Surface, _, Some(file)) => {
-                return Err(text.error(file.span(), "`tangents` are for the model \"fibre\": a surface has `normals`"));
+                return Err(text
+                    .error(file.span(), "`tangents` are for the model \"fibre\": a surface has `normals`"));
             }
             (Model::Fibre, Some(file), _) => {
-                return Err(text.error(file.span(), "`normals` are for the model \"surface\": a fibre has `tangents`"));
+                return Err(text
+                    .error(file.span(), "`normals` are for the model \"surface\": a fibre has `tangents`"));
             }
         };
         let lighting = Self { section, lights, stored };
         let (factor, added) = lighting.shading(Directions { levels: Vec::new() }).bounds();
         if factor.max(added) > BRIGHTEST {
-            let message =
-                format!("lights and factors together are {:.1e} times white, expected at most {BRIGHTEST:e}", factor.max(added));
+            let message = format!(
+                "lights and factors together are {:.1e} times white, expected at most {BRIGHTEST:e}",
+                factor.max(added)
+            );
             return Err(text.error(span, message));
         }
         Ok(Some(lighting))
@@ -81,7 +84,9 @@ impl<'a> Lighting<'a> {
                     "the light is inside the camera, expected a distance from the eye of at least that of the near plane, {}; it is {distance}",
                     camera.near
                 );
-                return Err(text.error(span.clone(), message).with_help("move the light, or make camera.near smaller"));
+                return Err(text
+                    .error(span.clone(), message)
+                    .with_help("move the light, or make camera.near smaller"));
             }
         }
         Ok(())

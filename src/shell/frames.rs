@@ -222,9 +222,7 @@ mod tests {
             for kind in [FrameKind::Covectors, FrameKind::Vectors] {
                 let frames = shell.frames(kind);
                 assert!(frames.maps.iter().all(DMat3::is_finite));
-                let zero = (0..shell.cells.len())
-                    .filter(|&t| frames.at(t, [0.25; 4]) == DMat3::ZERO)
-                    .count();
+                let zero = (0..shell.cells.len()).filter(|&t| frames.at(t, [0.25; 4]) == DMat3::ZERO).count();
                 assert_eq!(zero, if kind == FrameKind::Vectors { degenerate } else { 0 });
             }
         }

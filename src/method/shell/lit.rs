@@ -118,7 +118,14 @@ impl LitView {
     ///
     /// # Errors
     /// As [`Lit::new`].
-    pub fn refill(&mut self, lit: &Lit, shading: &Shading, shell: &Shell, seen: &Seen, view: &View) -> Result<()> {
+    pub fn refill(
+        &mut self,
+        lit: &Lit,
+        shading: &Shading,
+        shell: &Shell,
+        seen: &Seen,
+        view: &View,
+    ) -> Result<()> {
         self.cells.refill(&lit.cells(shell, seen))?;
         self.lighting.refill(&lighting(shading, view, seen.unit))
     }
@@ -128,7 +135,8 @@ impl LitView {
 fn lighting(shading: &Shading, view: &View, unit: f64) -> Vec<u8> {
     let frame = view.camera.frame();
     let lighting = Lighting {
-        world_from_view: [frame.right, frame.up, frame.forward].map(|axis| axis.as_vec3().extend(0.0).to_array()),
+        world_from_view: [frame.right, frame.up, frame.forward]
+            .map(|axis| axis.as_vec3().extend(0.0).to_array()),
         ambient: shading.ambient.as_vec3().to_array(),
         diffuse: shading.diffuse as f32,
         specular: shading.specular as f32,

@@ -30,8 +30,9 @@ pub struct Directions {
 pub struct DirectionLevel {
     /// Texels along u, v, w.
     pub size: [u32; 3],
-    /// `[x weight, y weight, z weight, weight]`, u fastest. In level 0 `(x, y, z)` is of unit length and the weight is the texel's
-    /// alpha as a part of the largest alpha; both are 0 where there is no direction. In other levels they are means.
+    /// `[x weight, y weight, z weight, weight]`, u fastest. In level 0 the weight is the texel's alpha as a part of the largest alpha,
+    /// and `(x, y, z)` is of unit length, or shorter by how uncertain it is; both are 0 where there is no direction. In other
+    /// levels they are means.
     pub texels: Vec<[f32; 4]>,
 }
 
@@ -41,10 +42,11 @@ const SHORTEST: f64 = 0.01;
 impl Directions {
     /// Outward normals: minus the gradient of alpha, by central differences; none where that is 0.
     pub fn normals(volume: &Volume) -> Self {
-        Self::of(volume, |at| normals::normal(volume, at))
+        Self::of(volume, |at| normals::normal(volume, at).normalize_or_zero())
     }
 
-    /// Tangents of fibres: along which alpha changes least. Of the two senses it is that which rises towards w = 1.
+    /// Tangents of fibres: along which alpha changes least, shorter where that is less clear. Of the two senses it is that which
+    /// rises towards w = 1.
     pub fn tangents(volume: &Volume) -> Self {
         let tensors = tangents::Tensors::of(volume);
         Self::of(volume, |at| tensors.tangent(at))
@@ -66,16 +68,16 @@ impl Directions {
         let texel = |[u, v, w]: [u32; 3]| {
             let [width, height] = [size[0] as usize, size[1] as usize];
             let vector = vectors[(w as usize * height + v as usize) * width + u as usize];
-            if vector.length() < SHORTEST { DVec3::ZERO } else { vector }
+            if vector.length() < SHORTEST { DVec3::ZERO } else { vector.normalize() }
         };
         Ok(Self::of(volume, texel))
     }
 
-    /// From a vector for each texel, of any length.
+    /// From a vector for each texel, no longer than 1: a shorter one is less certain, or the mean of several.
     pub fn of(volume: &Volume, vector: impl Fn([u32; 3]) -> DVec3 + Sync) -> Self {
         let largest = volume.texels.par_iter().map(|texel| texel[3]).reduce(|| 0.0, f32::max);
         let texel = |(index, [.., alpha]): (usize, &[f32; 4])| {
-            let direction = vector(texel_at(volume.size, index)).normalize_or_zero();
+            let direction = vector(texel_at(volume.size, index));
             if direction == DVec3::ZERO || *alpha == 0.0 {
                 return [0.0; 4];
             }
@@ -119,8 +121,8 @@ fn halved(finer: &DirectionLevel) -> DirectionLevel {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::volume::{Pyramid, RawVolume, Sample, write_raw};
     use crate::volume::AlphaMode;
+    use crate::volume::{Pyramid, RawVolume, Sample, write_raw};
 
     fn grey(size: [u32; 3], alpha: impl Fn([u32; 3]) -> f32) -> Volume {
         let count = size.iter().product::<u32>() as usize;
@@ -142,9 +144,10 @@ mod tests {
             sizes(&pyramid.levels.iter().map(|level| level.size).collect::<Vec<_>>())
         );
         let mean = |level: &DirectionLevel| {
-            let sum = level.texels.iter().fold([0.0; 4], |sum: [f64; 4], texel| {
-                std::array::from_fn(|c| sum[c] + f64::from(texel[c]))
-            });
+            let sum = level
+                .texels
+                .iter()
+                .fold([0.0; 4], |sum: [f64; 4], texel| std::array::from_fn(|c| sum[c] + f64::from(texel[c])));
             sum.map(|value| value / level.texels.len() as f64)
         };
         let whole = mean(&directions.levels[0]);
@@ -159,7 +162,7 @@ mod tests {
     #[test]
     fn weights_are_parts_of_the_largest_alpha() {
         let volume = grey([4, 1, 2], |[u, ..]| [0.0, 0.2, 0.4, 0.1][u as usize]);
-        let level = &Directions::of(&volume, |[u, ..]| DVec3::X * f64::from(u)).levels[0];
+        let level = &Directions::of(&volume, |[u, ..]| if u == 0 { DVec3::ZERO } else { DVec3::X }).levels[0];
         let weights: Vec<f32> = level.texels[..4].iter().map(|texel| texel[3]).collect();
         assert_eq!(weights, [0.0, 0.5, 1.0, 0.25]);
         assert_eq!(level.texels[1], [0.5, 0.0, 0.0, 0.5]);
@@ -184,7 +187,12 @@ mod tests {
         };
         // Half way between the bytes is none; 0 is -1.
         let half = 127.0 / 255.0;
-        write([2, 1, 2], 3, vec![half, half, 1.0, half, half, half, 0.0, half, half, 1.0, half, half], Sample::Unorm8);
+        write(
+            [2, 1, 2],
+            3,
+            vec![half, half, 1.0, half, half, half, 0.0, half, half, 1.0, half, half],
+            Sample::Unorm8,
+        );
         let found = Directions::stored(&path, &volume).unwrap();
         let z: Vec<f32> = found.levels[0].texels.iter().map(|texel| texel[2]).collect();
         assert!((z[0] - 1.0).abs() < 1e-4 && z[1] == 0.0 && z[2].abs() < 0.01, "{z:?}");

@@ -33,8 +33,8 @@ impl Tensors {
     /// The window 1-2-1 along one axis.
     fn smooth(&mut self, axis: usize) {
         let smoothed = (0..self.entries.len()).into_par_iter().map(|index| {
-            let [before, after] =
-                neighbours(self.size, texel_at(self.size, index), axis).map(|at| self.entries[self.index(at)]);
+            let [before, after] = neighbours(self.size, texel_at(self.size, index), axis)
+                .map(|at| self.entries[self.index(at)]);
             std::array::from_fn(|e| 0.25 * (before[e] + after[e]) + 0.5 * self.entries[index][e])
         });
         self.entries = smoothed.collect();
@@ -45,17 +45,18 @@ impl Tensors {
         (w * self.size[1] as usize + v) * self.size[0] as usize + u
     }
 
-    /// In texture space, of any length; zero where alpha does not change about the texel.
+    /// In texture space, of the length [`certainty`]; zero where alpha does not change about the texel.
     pub(super) fn tangent(&self, at: [u32; 3]) -> DVec3 {
         let [xx, yy, zz, xy, xz, yz] = self.entries[self.index(at)];
         let trace = xx + yy + zz;
         if trace == 0.0 {
             return DVec3::ZERO;
         }
-        let tensor =
-            DMat3::from_cols(DVec3::new(xx, xy, xz), DVec3::new(xy, yy, yz), DVec3::new(xz, yz, zz));
-        let tangent = least_eigenvector(tensor * trace.recip()) / DVec3::from_array(self.size.map(f64::from));
-        if tangent.z < 0.0 { -tangent } else { tangent }
+        let tensor = DMat3::from_cols(DVec3::new(xx, xy, xz), DVec3::new(xy, yy, yz), DVec3::new(xz, yz, zz));
+        let tensor = tensor * trace.recip();
+        let along = least_eigenvector(tensor);
+        let tangent = (along / DVec3::from_array(self.size.map(f64::from))).normalize_or_zero();
+        certainty(tensor, along) * if tangent.z < 0.0 { -tangent } else { tangent }
     }
 }
 
@@ -64,13 +65,28 @@ fn least_eigenvector(matrix: DMat3) -> DVec3 {
     // Keeps the inverse finite where the least eigenvalue is 0, and no two eigenvalues in other order.
     let mut power = (matrix + 1e-6 * DMat3::IDENTITY).inverse();
     for _ in 0..8 {
-        power *= power.to_cols_array().into_iter().fold(0.0, |most: f64, entry| most.max(entry.abs())).recip();
+        power *=
+            power.to_cols_array().into_iter().fold(0.0, |most: f64, entry| most.max(entry.abs())).recip();
         power = power * power;
     }
     // Every column of the projection is along the eigenvector; the longest has lost least to rounding.
     let columns = [power.x_axis, power.y_axis, power.z_axis];
     let longest = columns.into_iter().max_by(|a, b| a.length_squared().total_cmp(&b.length_squared()));
     longest.unwrap_or_default().normalize_or_zero()
+}
+
+/// How much a tensor of trace 1 is that of a fibre, 0 to 1: `(b - a) / c` of its eigenvalues `a <= b <= c`, of which the first is
+/// that of `along`. Of a fibre `b` and `c` are about equal and `a` is small; of a sheet, where no direction is better than
+/// another, `a` and `b` are small (C.-F. Westin et al., *Processing and visualization for diffusion tensor MRI*, 2002).
+fn certainty(tensor: DMat3, along: DVec3) -> f64 {
+    let least = along.dot(tensor * along);
+    // The other two from their sum and product.
+    let [xx, yy, zz] = [tensor.x_axis.x, tensor.y_axis.y, tensor.z_axis.z];
+    let [xy, xz, yz] = [tensor.x_axis.y, tensor.x_axis.z, tensor.y_axis.z];
+    let minors = xx * yy - xy * xy + xx * zz - xz * xz + yy * zz - yz * yz;
+    let (sum, product) = (1.0 - least, minors - least * (1.0 - least));
+    let root = (0.25 * sum * sum - product).max(0.0).sqrt();
+    ((0.5 * sum - root - least) / (0.5 * sum + root)).clamp(0.0, 1.0)
 }
 
 #[cfg(test)]
@@ -82,10 +98,13 @@ mod tests {
     #[test]
     fn the_least_eigenvector_is_found_in_any_turn() {
         for (turn, values) in [(0.3, [0.0, 0.4, 0.6]), (1.7, [0.1, 0.2, 0.7]), (2.9, [0.0, 0.5, 0.5])] {
-            let turn = DMat3::from_quat(DQuat::from_axis_angle(DVec3::new(0.2, -0.6, 0.77).normalize(), turn));
+            let turn =
+                DMat3::from_quat(DQuat::from_axis_angle(DVec3::new(0.2, -0.6, 0.77).normalize(), turn));
             let matrix = turn * DMat3::from_diagonal(DVec3::from_array(values)) * turn.transpose();
             let found = least_eigenvector(matrix);
             assert!(found.dot(turn.x_axis).abs() > 1.0 - 1e-9, "{found} for {}", turn.x_axis);
+            let [a, b, c] = values;
+            assert!((certainty(matrix, found) - (b - a) / c).abs() < 1e-6);
         }
     }
 
@@ -109,7 +128,9 @@ mod tests {
         for index in (0..volume.texels.len()).filter(|&i| volume.texels[i][3] > 0.1) {
             let at = texel_at(size, index);
             if (3..13).contains(&at[2]) {
-                let tangent = tensors.tangent(at).normalize();
+                let tangent = tensors.tangent(at);
+                assert!(tangent.length() > 0.3, "{at:?}: {}", tangent.length());
+                let tangent = tangent.normalize();
                 // Central differences shorten a wave of 16 texels by a few hundredths.
                 assert!(tangent.dot(lean.normalize()) > 0.995, "{at:?}: {tangent} for {lean}");
                 found += 1;
