@@ -273,6 +273,7 @@ fn camera(text: &Text, section: &CameraSection) -> Result<Camera> {
 mod tests {
     use super::*;
     use crate::scene::{Light, Model, Source};
+    use crate::volume::{AlphaMode, RawVolume, Sample};
 
     const SCENE: &str = r#"
 [mesh]
@@ -380,7 +381,7 @@ recipe = "fog.toml"
         ["[camera]\neye = [0, 0, 1]\ntarget = [0, 0, 0]\nup = [0, 0, 9]", "[0, 0, 9]", "line of sight"],
         ["[camera]\neye = [0, 0, 1]\ntarget = [0, 0, 0]\nfov = 180", "180", "between 0 and 180"],
         ["[camera]\neye = [0, 0, 1]\ntarget = [0, 0, 0]\nnear = 0", "0", "greater than 0"],
-        ["[shading]\nmodel = 'metal'", "'metal'", "`surface`, `fibre`"],
+        ["[shading]\nmodel = 'metal'", "'metal'", "`surface` or `fibre`"],
         ["[shading]\nambient = [0, -1, 0]", "-1", "at least 0"],
         ["[shading]\nspecular = -0.5", "-0.5", "at least 0"],
         ["[shading]\nshininess = 0.5", "0.5", "from 1 to 1000"],
@@ -438,17 +439,44 @@ recipe = "fog.toml"
             },
         ];
         assert_eq!(shading.lights, expected);
-        let levels = |sizes: Vec<[u32; 3]>| sizes;
-        assert_eq!(
-            levels(shading.directions.levels.iter().map(|level| level.size).collect()),
-            levels(scene.volume.levels.iter().map(|level| level.size).collect())
-        );
+        let sizes = shading.directions.levels.iter().map(|level| level.size);
+        assert!(sizes.eq(scene.volume.levels.iter().map(|level| level.size)));
         let light = "[[light]]\ndirection = [0, -1, 0]\n";
         let text = format!("{SCENE}[shading]\n{}", light.repeat(65));
         let error = parse("scene.toml", &text, folder.path()).map(drop).unwrap_err();
         assert!(error.to_string().contains("65 lights, expected at most 64"), "{error}");
         assert!(parse("scene.toml", &text.replacen(light, "", 1), folder.path()).is_ok());
         assert!(parse("scene.toml", SCENE, folder.path()).unwrap().scene.shading.is_none());
+    }
+
+    #[test]
+    fn stored_normals_take_the_place_of_derived_ones() {
+        let folder = folder();
+        let lit = format!("{SCENE}[shading]\n");
+        let directions = |text: &str| {
+            parse("scene.toml", text, folder.path()).unwrap().scene.shading.unwrap().directions.levels
+        };
+        let derived = directions(&lit);
+        let unweighted = derived[0].texels.iter().flat_map(|[x, y, z, w]| [x / w, y / w, z / w]);
+        let raw = RawVolume {
+            path: PathBuf::new(),
+            format: String::new(),
+            size: [4; 3],
+            channels: 3,
+            values: unweighted.map(|x| if x.is_finite() { -2.0 * x } else { 0.0 }).collect(),
+            full_scale: 1.0,
+            alpha_mode: AlphaMode::Straight,
+        };
+        volume::write_raw(&folder.path().join("n.ktx2"), &raw, Sample::Float32).unwrap();
+        let stored = directions(&format!("{lit}normals = 'n.ktx2'"));
+        // Turned about, so that it is known who they are; rounded to f32 once more.
+        for (stored, derived) in stored.iter().zip(&derived) {
+            for ([a, b, c, d], [x, y, z, w]) in stored.texels.iter().zip(&derived.texels) {
+                let apart = [a + x, b + y, c + z, d - w];
+                assert!(apart.iter().all(|apart| apart.abs() < 1e-6), "{apart:?}");
+            }
+        }
+        assert!(derived[0].texels.iter().any(|texel| texel[3] > 0.1));
     }
 
     #[test]
