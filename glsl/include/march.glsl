@@ -1,9 +1,5 @@
 // Quadrature of `integral of T sigma c` along one ray in one tetrahedron.
 
-const uint PLAN_DEFAULT = 0; // midpoints, spread by length
-const uint PLAN_PAPER = 1;   // midpoints, as many in every tetrahedron
-const uint PLAN_EXACT = 2;   // Gauss in each voxel
-
 // What a ray has gathered, front to back.
 struct Light {
     Gathered gathered;
@@ -105,7 +101,8 @@ void march_exactly(Path path, vec2 segment, float per_depth, inout Light light) 
     Lattice coarse = lattice_of(path, min(level + 1.0, view.last_level), segment.x);
     float from = segment.x;
     float start = extinction(fetch(path, from));
-    while (from < segment.y && transmittance(light.gathered) > 1e-7) {
+    // As many planes as a device may be asked to pass; where depths in f32 do not tell two of them apart, too, there is an end.
+    for (uint planes = 0; planes < 65535 && from < segment.y && transmittance(light.gathered) > 1e-7; planes++) {
         float to = min(segment.y, first(fine.next));
         if (MINIFIED) to = min(to, first(coarse.next));
         pass(fine, to);

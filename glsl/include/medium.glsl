@@ -10,7 +10,7 @@ float optical_depth(float alpha) {
     return alpha < 0.25 ? series : -log(max(1.0 - alpha, 0.0));
 }
 
-// 1 - exp(-depth): below 1/32 the series, whose first term left out is depth^5 / 120 < 2^-31 depth.
+// 1 - exp(-depth): below 1/32 the series, whose first term left out is depth^4 / 120 < 2^-26 of it.
 float opacity(float depth) {
     float series = depth * (1.0 - depth * (1.0 / 2.0 - depth * (1.0 / 6.0 - depth * (1.0 / 24.0))));
     return depth < 0.03125 ? series : 1.0 - exp(-depth);

@@ -5,7 +5,7 @@ vec3 pixel_ray() {
     return vec3((gl_FragCoord.xy - view.centre) * vec2(view.pixel, -view.pixel), 1.0);
 }
 
-// Whether a ray in the plane of a face counts as inside: as if it were moved to the right, and by far less down, so that of the
+// Whether a ray in the plane of a face counts as inside: as if it were moved to the right, and by far less up, so that of the
 // two cells at the face it is in one.
 bool is_beside(vec3 inward) {
     return inward.x > 0.0 || (inward.x == 0.0 && inward.y > 0.0);

@@ -1,6 +1,10 @@
 // Reads the volume along a ray in one tetrahedron, at the level of detail of the pixel's footprint.
 
-layout(constant_id = 0) const uint PLAN = 0; // see march.glsl
+const uint PLAN_DEFAULT = 0; // midpoints, spread by length
+const uint PLAN_PAPER = 1;   // midpoints, as many in every tetrahedron
+const uint PLAN_EXACT = 2;   // Gauss in each voxel
+
+layout(constant_id = 0) const uint PLAN = 0;
 layout(constant_id = 1) const bool MINIFIED = true; // whether any level but 0 can be needed
 
 layout(constant_id = 2) const bool EXTINCTION = false; // what the fourth channel holds; else opacity
@@ -42,7 +46,7 @@ vec4 fetch(Path path, float depth) {
 
 // How many samples the plan gives to a segment: no more than `MOST_SAMPLES` of src/method/shell.
 uint sample_count(Path path, float entry, float exit) {
-    if (PLAN == 1) return view.samples;
+    if (PLAN == PLAN_PAPER) return view.samples;
     float texel = MINIFIED ? exp2(floor(level_of_detail(path, 0.5 * (entry + exit)))) : 1.0;
     float texels = length(path.from_depth * view.texels) * (exit - entry) / texel;
     return uint(clamp(ceil(texels / view.step), 1.0, 65535.0));

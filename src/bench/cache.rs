@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 
 use super::file::write_whole;
 use super::fingerprint::Fingerprint;
-use crate::frame::Image;
+use crate::frame::{Frame, Image};
 use crate::progress::{Interrupt, Progress};
 use crate::scene::Scene;
 use crate::{Result, reference};
@@ -59,8 +59,22 @@ pub fn reference(
     progress: &dyn Progress,
     interrupt: &Interrupt,
 ) -> Result<Cached> {
+    let render = || reference::render(scene, &scene.view, progress, interrupt);
+    kept(fingerprint, [scene.view.width, scene.view.height], folder, warnings, render)
+}
+
+/// As [`fn@reference`], of any picture by the reference: `render` computes it where `folder` has none of that fingerprint.
+///
+/// # Errors
+/// [`Error::Output`](crate::Error::Output) where the picture cannot be kept, and those of `render`.
+pub fn kept(
+    fingerprint: &Fingerprint,
+    size: [u32; 2],
+    folder: &Path,
+    warnings: &mut Vec<String>,
+    render: impl FnOnce() -> Result<Frame>,
+) -> Result<Cached> {
     let path = path(folder, fingerprint);
-    let size = [scene.view.width, scene.view.height];
     if path.exists() {
         match read(&path, fingerprint, size) {
             Ok(cached) => return Ok(cached),
@@ -69,7 +83,7 @@ pub fn reference(
             }
         }
     }
-    let frame = reference::render(scene, &scene.view, progress, interrupt)?;
+    let frame = render()?;
     let milliseconds = frame.report.stages.iter().map(|stage| stage.milliseconds).sum();
     let cached = Cached { image: frame.image, milliseconds, reused: false };
     write(&path, fingerprint, &cached)?;

@@ -7,18 +7,22 @@ use bytemuck::NoUninit;
 use serde::{Deserialize, Serialize};
 
 use crate::reference::TOLERANCE;
-use crate::scene::{Light, Medium, Model, Scene, Shading, Source, View};
-use crate::volume::Quantity;
+use crate::scene::{Light, Model, Scene, Shading, Source, View};
+use crate::volume::{DirectionLevel, Quantity, Volume};
 
 /// The code that a cached reference comes from: were it changed, so might its pictures be.
-const REFERENCE_CODE: [(&str, &str); 6] = [
+const REFERENCE_CODE: [(&str, &str); 7] = [
     ("crossing.rs", include_str!("../reference/crossing.rs")),
     ("integrate.rs", include_str!("../reference/integrate.rs")),
     ("mod.rs", include_str!("../reference/mod.rs")),
     ("quadrature.rs", include_str!("../reference/quadrature.rs")),
     ("shade.rs", include_str!("../reference/shade.rs")),
+    ("supersample.rs", include_str!("../reference/supersample.rs")),
     ("texture.rs", include_str!("../reference/texture.rs")),
 ];
+
+/// What of a scene the reference asks for: rays, and the density of texels across them.
+const SCENE_CODE: [&str; 2] = [include_str!("../scene/camera.rs"), include_str!("../scene/mod.rs")];
 
 /// Written as 32 hexadecimal digits.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -63,65 +67,78 @@ impl Fingerprint {
     /// Of everything that the reference's picture of `view` depends on: geometry, texture, medium, light, camera, and the
     /// reference itself. How finely a method marches is not among it.
     pub fn of_reference(scene: &Scene, view: &View) -> Self {
-        let mut builder = Self::builder("reference").bytes(env!("CARGO_PKG_VERSION").as_bytes());
-        for (_, code) in REFERENCE_CODE {
-            builder = builder.bytes(code.as_bytes());
-        }
-        let Medium { opacity_distance, lod_footprint } = scene.medium;
-        let View { camera, width, height, depth: _ } = view;
-        builder = builder
-            .numbers(&[TOLERANCE, opacity_distance, lod_footprint, camera.fov_y, camera.near])
-            .numbers(&[camera.eye, camera.target, camera.up])
-            .numbers(&[*width, *height])
-            .numbers(&scene.shell.topology.tetrahedra)
-            .numbers(&scene.shell.vertices)
-            .numbers(&scene.shell.texture);
-        for cell in &scene.shell.cells {
-            builder = builder.numbers(&cell.gradients).numbers(&[cell.texture_from_world]);
-        }
-        for level in &scene.volume.levels {
-            let quantity = match level.quantity {
-                Quantity::Opacity => "opacity",
-                Quantity::Extinction => "extinction",
-            };
-            builder = builder.bytes(quantity.as_bytes()).numbers(&level.size).numbers(&level.texels);
-        }
-        match &scene.shading {
-            Some(shading) => builder.bytes(b"lit").shading(scene, shading),
-            None => builder,
-        }
-        .finish()
+        let builder = Self::builder("reference").numbers(&[TOLERANCE, scene.medium.lod_footprint]);
+        seen(builder, scene, view, &scene.volume.levels)
+    }
+
+    /// The same of [`reference::render_supersampled`](crate::reference::render_supersampled) with `side` times `side` rays
+    /// a pixel: of the volume the first level alone is among it.
+    pub fn of_supersampled(scene: &Scene, view: &View, side: u32, tolerance: f64) -> Self {
+        let builder = Self::builder("supersampled").numbers(&[tolerance]).numbers(&[side]);
+        seen(builder, scene, view, &scene.volume.levels[..1])
     }
 }
 
-impl Builder {
-    fn shading(self, scene: &Scene, shading: &Shading) -> Self {
-        let Shading { model, ambient, diffuse, specular, shininess, lights, directions } = shading;
-        let model_name = match model {
-            Model::Surface => "surface",
-            Model::Fibre => "fibre",
-        };
-        let frames = scene.shell.frames(model.frame_kind());
-        let mut builder = self
-            .bytes(model_name.as_bytes())
-            .numbers(&[*ambient])
-            .numbers(&[*diffuse, *specular, *shininess])
-            .numbers(&frames.maps)
-            .numbers(&frames.of_vertices);
-        for Light { source, colour } in lights {
-            builder = match source {
-                Source::Directional { towards } => builder.bytes(b"directional").numbers(&[*towards]),
-                Source::Point { position, falloff } => {
-                    builder.bytes(b"point").numbers(&[*position]).numbers(&[falloff.unwrap_or(f64::INFINITY)])
-                }
-            }
-            .numbers(&[*colour]);
-        }
-        for level in &directions.levels {
-            builder = builder.numbers(&level.size).numbers(&level.texels);
-        }
-        builder
+/// Adds what any picture by the reference depends on.
+fn seen(mut builder: Builder, scene: &Scene, view: &View, levels: &[Volume]) -> Fingerprint {
+    builder = builder.bytes(env!("CARGO_PKG_VERSION").as_bytes());
+    for (_, code) in REFERENCE_CODE {
+        builder = builder.bytes(code.as_bytes());
     }
+    for code in SCENE_CODE {
+        builder = builder.bytes(code.as_bytes());
+    }
+    let View { camera, width, height, depth: _ } = view;
+    builder = builder
+        .numbers(&[scene.medium.opacity_distance, camera.fov_y, camera.near])
+        .numbers(&[camera.eye, camera.target, camera.up])
+        .numbers(&[*width, *height])
+        .numbers(&scene.shell.topology.tetrahedra)
+        .numbers(&scene.shell.vertices)
+        .numbers(&scene.shell.texture);
+    for cell in &scene.shell.cells {
+        builder = builder.numbers(&cell.gradients).numbers(&[cell.texture_from_world]);
+    }
+    for level in levels {
+        let quantity = match level.quantity {
+            Quantity::Opacity => "opacity",
+            Quantity::Extinction => "extinction",
+        };
+        builder = builder.bytes(quantity.as_bytes()).numbers(&level.size).numbers(&level.texels);
+    }
+    if let Some(shading) = &scene.shading {
+        builder = lit(builder, scene, shading, &shading.directions.levels[..levels.len()]);
+    }
+    builder.finish()
+}
+
+/// Adds what the light is, and what it falls on.
+fn lit(builder: Builder, scene: &Scene, shading: &Shading, levels: &[DirectionLevel]) -> Builder {
+    let Shading { model, ambient, diffuse, specular, shininess, lights, directions: _ } = shading;
+    let model_name = match model {
+        Model::Surface => "surface",
+        Model::Fibre => "fibre",
+    };
+    let frames = scene.shell.frames(model.frame_kind());
+    let mut builder = builder
+        .bytes(model_name.as_bytes())
+        .numbers(&[*ambient])
+        .numbers(&[*diffuse, *specular, *shininess])
+        .numbers(&frames.maps)
+        .numbers(&frames.of_vertices);
+    for Light { source, colour } in lights {
+        builder = match source {
+            Source::Directional { towards } => builder.bytes(b"directional").numbers(&[*towards]),
+            Source::Point { position, falloff } => {
+                builder.bytes(b"point").numbers(&[*position]).numbers(&[falloff.unwrap_or(f64::INFINITY)])
+            }
+        }
+        .numbers(&[*colour]);
+    }
+    for level in levels {
+        builder = builder.numbers(&level.size).numbers(&level.texels);
+    }
+    builder
 }
 
 #[cfg(test)]
@@ -132,7 +149,7 @@ pub(crate) mod tests {
     use crate::mesh::generate::{Generator, Torus};
     use crate::scene::March;
     use crate::shell::{Shell, ShellOptions};
-    use crate::volume::{Directions, Pyramid, Volume};
+    use crate::volume::{Directions, Pyramid};
 
     /// A torus of fog in 32 x 32 pixels.
     pub(crate) fn scene() -> Scene {
@@ -230,6 +247,22 @@ pub(crate) mod tests {
             change(changed.shading.as_mut().unwrap());
             assert_ne!(original, print(&changed), "{name}");
         }
+    }
+
+    #[test]
+    fn of_many_rays_every_change_counts_but_those_of_coarse_levels() {
+        let print = |scene: &Scene| Fingerprint::of_supersampled(scene, &scene.view, 8, 1e-4);
+        let original = print(&scene());
+        for (name, change) in CHANGES {
+            let mut changed = scene();
+            change(&mut changed);
+            let has_no_part = ["a texel of the last level", "the level of detail"].contains(name);
+            assert_eq!(original == print(&changed), has_no_part, "{name}");
+        }
+        let scene = scene();
+        assert_ne!(original, Fingerprint::of_supersampled(&scene, &scene.view, 4, 1e-4));
+        assert_ne!(original, Fingerprint::of_supersampled(&scene, &scene.view, 8, 1e-5));
+        assert_ne!(original, Fingerprint::of_reference(&scene, &scene.view));
     }
 
     #[test]

@@ -2,8 +2,10 @@
 //!
 //! A [`Sweep`] says which scenes are measured at which [`Setting`]s; [`run()`] measures it, and writes what it found as
 //! JSON, CSV and a report in HTML. Times are taken in rounds over all points of a scene ([`mod@measure`]), errors against
-//! the f64 reference, whose pictures are kept in a [`cache`]. The [`pilot`] chooses a march by the error that is accepted. `docs/bench.md` describes the files key by key.
+//! the f64 reference, whose pictures are kept in a [`cache`]. `docs/bench.md` describes the files key by key. The [`pilot`]
+//! chooses a march by the error that is accepted; [`antialiasing`] compares filters.
 
+pub mod antialiasing;
 pub mod cache;
 pub mod convergence;
 pub mod environment;

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::environment::Environment;
-use super::file::write_whole;
+use super::file::{check_writable, remove, write_whole};
 use super::measure::{Subject, measure};
 use super::remaining::Remaining;
 use super::report::{csv, html};
@@ -63,7 +63,9 @@ pub fn run(sweep: &Sweep, options: &Options<'_>, setup: &Setup<'_>) -> Result<Ou
         scene::load_if(path, &overrides, &Silent, &admit)?;
     }
     drop(opened);
-    results.write(&json)?;
+    // An earlier run's results stay until there are others.
+    check_writable(&json)?;
+    let [table, report] = ["results.csv", "report.html"].map(|name| options.out.join(name));
 
     let mut earlier = std::mem::take(&mut results.scenes).into_iter();
     results.complete = false;
@@ -85,13 +87,17 @@ pub fn run(sweep: &Sweep, options: &Options<'_>, setup: &Setup<'_>) -> Result<Ou
             cache: options.cache,
         };
         let finished = results.scenes.len();
+        let begun = earlier.next();
         let mut keep = |scene: &SceneResults| {
             results.scenes.truncate(finished);
             results.scenes.push(scene.clone());
+            results.scenes.extend(earlier.clone());
+            // They would tell of another run.
+            remove(&table)?;
+            remove(&report)?;
             results.write(&json)
         };
-        let (scene, of_scene) =
-            measure(&subject, earlier.next(), setup, &remaining, &mut warnings, &mut keep)?;
+        let (scene, of_scene) = measure(&subject, begun, setup, &remaining, &mut warnings, &mut keep)?;
         results.scenes.truncate(finished);
         results.scenes.push(scene);
         pictures.push(of_scene);
@@ -99,10 +105,9 @@ pub fn run(sweep: &Sweep, options: &Options<'_>, setup: &Setup<'_>) -> Result<Ou
     results.complete = true;
 
     results.write(&json)?;
-    let table = csv::table(&results);
-    write_whole(&options.out.join("results.csv"), |file| std::io::Write::write_all(file, table.as_bytes()))?;
+    let lines = csv::table(&results);
+    write_whole(&table, |file| std::io::Write::write_all(file, lines.as_bytes()))?;
     let page = html::page(&results, &pictures);
-    let report = options.out.join("report.html");
     write_whole(&report, |file| std::io::Write::write_all(file, page.as_bytes()))?;
     Ok(Outcome { results, warnings, report })
 }
@@ -124,11 +129,11 @@ fn resumed(json: &Path, fresh: &Results) -> Result<Results> {
         return Err(other("sweep"));
     }
     let device = |results: &Results| {
-        let Environment { device, driver, version, .. } = &results.environment;
-        [device.clone(), driver.clone(), version.clone()]
+        let Environment { device, driver, version, commit, .. } = &results.environment;
+        (device.clone(), driver.clone(), version.clone(), commit.clone())
     };
     if device(&results) != device(fresh) {
-        return Err(other("device or version"));
+        return Err(other("device, version or commit"));
     }
     Ok(results)
 }

@@ -42,7 +42,9 @@ impl Arguments {
                 "leave out --max-error, or --method",
             );
         }
-        match define.iter().find(|define| define.trim_start().starts_with("march.")) {
+        let is_of_march =
+            |define: &&String| define.split(['.', '=']).next().is_some_and(|key| key.trim() == "march");
+        match define.iter().find(is_of_march) {
             Some(define) => usage(
                 format!("--max-error chooses the march, and so does -D {define}"),
                 "leave out one of the two",
@@ -57,9 +59,12 @@ impl Arguments {
     /// As [`pilot::choose`].
     pub fn choose(&self, scene: &Scene, method: &Entry, setup: &Setup<'_>) -> Result<Option<Choice>> {
         let Some(max_error) = self.max_error else { return Ok(None) };
-        let cache = self.cache.clone().or_else(cache_folder);
+        let (cache, warning) = match &self.cache {
+            Some(cache) => (Some(cache.clone()), None),
+            None => usable(cache_folder()),
+        };
         let choice = pilot::choose(scene, max_error, method, cache.as_deref(), setup)?;
-        Ok(Some(Choice { max_error, choice, verify: self.verify, cache }))
+        Ok(Some(Choice { max_error, choice, verify: self.verify, cache, warning }))
     }
 }
 
@@ -69,6 +74,8 @@ pub struct Choice {
     choice: pilot::Choice,
     verify: bool,
     cache: Option<PathBuf>,
+    /// What the user should know.
+    pub warning: Option<String>,
 }
 
 impl Choice {
@@ -87,6 +94,7 @@ impl Choice {
             choice: pilot::Choice { trial: Trial { march, error }, measured },
             verify,
             cache,
+            warning: _,
         } = self;
         let verified = verify.then(|| error_of(scene, image, cache.as_deref(), setup)).transpose()?;
         Ok(Accuracy { max_error, march, estimate: error, measured, verified })
@@ -148,6 +156,23 @@ fn cache_folder() -> Option<PathBuf> {
     let given = std::env::var_os("XDG_CACHE_HOME").map(PathBuf::from).filter(|folder| folder.is_absolute());
     let folder = given.or_else(|| Some(std::env::home_dir()?.join(".cache")))?;
     Some(folder.join("mesoshell"))
+}
+
+/// The folder, if files can be made there; else a warning.
+fn usable(folder: Option<PathBuf>) -> (Option<PathBuf>, Option<String>) {
+    let Some(folder) = folder else {
+        return (None, Some("there is no cache folder: what was learnt of this view is not kept".to_owned()));
+    };
+    match std::fs::create_dir_all(&folder).and_then(|()| tempfile::tempfile_in(&folder)) {
+        Ok(_) => (Some(folder), None),
+        Err(error) => {
+            let folder = folder.display();
+            (
+                None,
+                Some(format!("{folder}: {error}; what was learnt of this view is not kept, name a --cache")),
+            )
+        }
+    }
 }
 
 fn error_bound(text: &str) -> std::result::Result<f64, String> {

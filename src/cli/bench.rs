@@ -1,5 +1,7 @@
 //! `mesoshell bench`: run time against error, of a sweep or of some scenes.
 
+mod antialiasing;
+
 use std::io::{IsTerminal, stderr};
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -54,7 +56,8 @@ pub struct Arguments {
 /// # Errors
 /// Whatever stands between a scene and its picture.
 pub fn run(arguments: Arguments, talk: Talk) -> Result<()> {
-    let sweep = what(&arguments)?;
+    let antialiasing = antialiasing::sweep(&arguments)?;
+    let sweep = antialiasing.is_none().then(|| what(&arguments)).transpose()?;
     let interrupt = Interrupt::default();
     listen(&interrupt);
     let bar = Arc::new(Bar::new(talk));
@@ -63,10 +66,21 @@ pub fn run(arguments: Arguments, talk: Talk) -> Result<()> {
     let cache = arguments.cache.clone().unwrap_or_else(|| arguments.output.join("cache"));
     let options = Options { out: &arguments.output, cache: &cache, resume: arguments.resume };
     let setup = Setup { device: &device, validation: None, progress: &progress, interrupt: &interrupt };
+    let Some(sweep) = sweep else {
+        let sweep = antialiasing.expect("one of the two was read");
+        let outcome = bench::antialiasing::run(&sweep, &options, &setup);
+        bar.bar.finish_and_clear();
+        return antialiasing::tell(&outcome?, talk);
+    };
     let outcome = bench::run(&sweep, &options, &setup);
     bar.bar.finish_and_clear(); // The line is wiped before anything else is said.
     if matches!(outcome, Err(Error::Interrupted)) {
-        talk.warn("what was measured is kept: go on with --resume");
+        let kept = Results::read(&arguments.output.join("results.json"));
+        let is_begun = kept.is_ok_and(|kept| !kept.complete && kept.fingerprint == sweep.fingerprint());
+        talk.warn(match is_begun {
+            true => "what was measured is kept: go on with --resume",
+            false => "nothing was measured yet",
+        });
     }
     let outcome = outcome?;
     for warning in &outcome.warnings {

@@ -28,7 +28,7 @@ pub struct Arguments {
     #[arg(long, value_enum, default_value_t = Metric::Rmse, requires = "threshold")]
     metric: Metric,
     /// End with exit code 1 where the metric is above this; psnr: below
-    #[arg(long, value_name = "X", allow_negative_numbers = true)]
+    #[arg(long, value_name = "X", allow_negative_numbers = true, value_parser = threshold)]
     threshold: Option<f64>,
     /// What lies behind the images for FLIP and for the maps: linear red, green, blue
     #[arg(long, value_name = "R,G,B", value_parser = color, default_value = "0,0,0")]
@@ -42,6 +42,13 @@ pub struct Arguments {
     /// Write the FLIP error of each pixel, in magma: black is 0, light yellow is 1
     #[arg(long, value_name = "FILE.png", value_parser = png)]
     flip_map: Option<PathBuf>,
+}
+
+fn threshold(text: &str) -> std::result::Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(threshold) if threshold.is_finite() => Ok(threshold),
+        _ => Err("expected a number, such as 0.02".to_owned()),
+    }
 }
 
 #[derive(Clone, Copy, ValueEnum)]

@@ -1,11 +1,14 @@
-//! `mesoshell mesh info`: what a mesh file holds.
+//! `mesoshell mesh`: what a mesh file holds, and figures to voxelise.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Subcommand;
+use clap::builder::PossibleValuesParser;
 use mesoshell::Result;
+use mesoshell::mesh::figure::Figure;
 use mesoshell::mesh::projection::Projection;
 use mesoshell::mesh::{info, obj};
+use serde::Serialize;
 
 use super::{Talk, table};
 
@@ -19,13 +22,49 @@ pub enum Command {
         #[arg(long, value_parser = str::parse::<Projection>)]
         projection: Option<Projection>,
     },
+    /// Make a figure to voxelise
+    Make {
+        /// Which
+        #[arg(value_parser = PossibleValuesParser::new(Figure::ALL.map(|(name, _)| name)))]
+        figure: String,
+        /// The OBJ file; its materials are written beside it, under the same name with .mtl
+        #[arg(short, long, value_name = "FILE")]
+        output: PathBuf,
+    },
+}
+
+/// What `make` prints with `--json`.
+#[derive(Serialize)]
+struct Made {
+    output: PathBuf,
+    positions: usize,
+    triangles: usize,
+    materials: usize,
 }
 
 /// # Errors
-/// The mesh cannot be read.
+/// The mesh cannot be read or written.
 pub fn run(command: Command, talk: Talk) -> Result<()> {
-    let Command::Info { file, projection } = command;
-    let info = info::info(&obj::load(&file, projection.as_ref())?);
+    match command {
+        Command::Info { file, projection } => tell(&file, projection.as_ref(), talk),
+        Command::Make { figure, output } => make(&figure, output, talk),
+    }
+}
+
+fn make(figure: &str, output: PathBuf, talk: Talk) -> Result<()> {
+    let entry = Figure::ALL.iter().find(|(name, _)| *name == figure);
+    let model = entry.expect("clap lets through the names of the table alone").1.model();
+    obj::write_model(&output, &model)?;
+    let (positions, triangles) = (model.positions.len(), model.triangles.len());
+    let made = Made { output, positions, triangles, materials: model.materials.len() };
+    talk.result(&made, || {
+        let rows = [("positions", positions), ("triangles", triangles), ("materials", made.materials)];
+        format!("{}\n{}", made.output.display(), table(rows.map(|(name, count)| (name, count.to_string()))))
+    })
+}
+
+fn tell(file: &Path, projection: Option<&Projection>, talk: Talk) -> Result<()> {
+    let info = info::info(&obj::load(file, projection)?);
     talk.result(&info, || {
         let rows = [
             ("positions", info.positions.to_string()),

@@ -117,6 +117,7 @@ fn render(arguments: &Arguments, progress: &Arc<dyn Progress>, interrupt: &Inter
 
     let mut watch = Stopwatch::start();
     let choice = arguments.accuracy.choose(&loaded, entry, &setup)?;
+    let warning = choice.as_ref().and_then(|choice| choice.warning.clone());
     if let Some(choice) = &choice {
         loaded.march = choice.march();
         watch.lap("pilot");
@@ -127,6 +128,7 @@ fn render(arguments: &Arguments, progress: &Arc<dyn Progress>, interrupt: &Inter
     stages.extend(watch.finish());
 
     let mut frame = method.render(&view)?;
+    frame.report.warnings.extend(warning);
     drop(method);
     let messages = messages.as_ref().map_or_else(Vec::new, Messages::all);
     if !messages.is_empty() {

@@ -1,7 +1,9 @@
 //! The base mesh: triangles with positions, normals and texture coordinates.
 
+pub mod figure;
 pub mod generate;
 pub mod info;
+pub mod model;
 pub mod normals;
 pub mod obj;
 pub mod projection;

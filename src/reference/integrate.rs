@@ -110,7 +110,7 @@ impl<'a> RayIntegral<'a> {
             direction,
             stretch: direction.length(),
             eye: reference.view.camera.eye,
-            detail_per_texel: reference.scene.medium.lod_footprint * reference.view.pixel_at_unit_depth(),
+            detail_per_texel: reference.lod_footprint * reference.view.pixel_at_unit_depth(),
             tolerance: reference.tolerance,
             brightness: reference.brightness,
             total_length: crossings.iter().map(|crossing| crossing.exit - crossing.enter).sum(),

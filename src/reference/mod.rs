@@ -13,7 +13,8 @@
 //! - `texture`: the texture along the ray, a cubic in each cell of texel centres;
 //! - `shade`: in a lit scene the colour that the texture has at a point;
 //! - `quadrature`: the nested rule of a panel;
-//! - `integrate`: the coupled integral along the ray, with its error control.
+//! - `integrate`: the coupled integral along the ray, with its error control;
+//! - `supersample`: pixels of many rays, for filters to be measured against.
 //!
 //! Rays are measured by *depth* `z` along the camera's forward axis. Where tetrahedra overlap, in a shell
 //! that intersects itself, their media add. A texel cell whose eight corners all have alpha 1 is a wall: what
@@ -23,7 +24,10 @@ mod crossing;
 mod integrate;
 mod quadrature;
 mod shade;
+mod supersample;
 mod texture;
+
+pub use supersample::render_supersampled;
 
 use std::sync::atomic::{AtomicU32, Ordering};
 
@@ -57,6 +61,7 @@ pub struct Sample {
 pub struct Reference<'a> {
     scene: &'a Scene,
     view: View,
+    lod_footprint: f64,
     tolerance: f64,
     /// The largest colour (premultiplied by nothing) of any point, at least 1.
     brightness: f64,
@@ -88,6 +93,7 @@ impl<'a> Reference<'a> {
         Self {
             scene,
             view: *view,
+            lod_footprint: scene.medium.lod_footprint,
             tolerance: TOLERANCE,
             brightness: brightness(scene),
             lit: Lit::of(scene),
@@ -100,6 +106,12 @@ impl<'a> Reference<'a> {
     #[must_use]
     pub fn with_tolerance(self, tolerance: f64) -> Self {
         Self { tolerance, ..self }
+    }
+
+    /// The same with another footprint than the medium's: see [`Medium::lod_footprint`](crate::scene::Medium::lod_footprint).
+    #[must_use]
+    pub fn with_lod_footprint(self, lod_footprint: f64) -> Self {
+        Self { lod_footprint, ..self }
     }
 
     /// The ray through the centre of pixel `(x, y)`.

@@ -11,6 +11,7 @@ use serde::Deserialize;
 use toml::Spanned;
 
 use super::Model;
+use super::PIXEL_FOOTPRINT;
 use super::camera::DEFAULT_FOV_DEGREES;
 use crate::mesh::generate::Generator;
 use crate::mesh::projection::Projection;
@@ -18,7 +19,7 @@ use crate::value::{
     Colour, Exactly, FieldOfView, Finite, Fraction, NotNegative, PictureSize, Pixels, Positive, Rounds,
     Samples, Shininess, Step,
 };
-use crate::volume::TransferFunction;
+use crate::volume::{Filter, TransferFunction};
 
 /// A whole scene file.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
@@ -91,8 +92,11 @@ pub struct VolumeSection {
     /// World units; by default one level-0 texel along w.
     pub opacity_distance: Option<Positive>,
     /// In pixels.
-    #[serde(default = "one_pixel")]
+    #[serde(default = "pixel_footprint")]
     pub lod_footprint: NotNegative,
+    /// How texels are merged.
+    #[serde(default)]
+    pub filter: Filter,
 }
 
 /// `[volume.density]`: the scalars of a file are densities.
@@ -233,8 +237,8 @@ fn no_offset() -> Exactly<2, Finite> {
     Exactly([Finite(0.0); 2])
 }
 
-fn one_pixel() -> NotNegative {
-    NotNegative(1.0)
+fn pixel_footprint() -> NotNegative {
+    NotNegative(PIXEL_FOOTPRINT)
 }
 
 fn default_fov() -> FieldOfView {

@@ -9,7 +9,7 @@ use super::camera::DEFAULT_NEAR;
 use super::file::{CameraSection, DensitySection, MeshSection, Plan, SceneFile, VolumeSection};
 use super::lighting::Lighting;
 use super::text::Text;
-use super::{Camera, March, Medium, Scene, Sizes, View, span};
+use super::{Camera, March, Medium, Scene, Sizes, View, span, texel_edges};
 use crate::frame::{Stage, Stopwatch};
 use crate::mesh::generate::Generator;
 use crate::mesh::projection::Projection;
@@ -135,17 +135,15 @@ fn build(
     let shading = shading.transpose()?;
 
     progress.stage("filtering the volume");
-    let volume = Pyramid::build(volume);
+    let opacity_distance =
+        mean_free_path.or(section.opacity_distance.map(|distance| distance.0)).unwrap_or(texel_along_w);
+    let texel = texel_edges(&shell, volume.size).map(|edge| edge / opacity_distance);
+    let volume = Pyramid::build_with(volume, section.filter, texel);
     stopwatch.lap("load.pyramid");
 
     let scene = Scene {
         view: View { camera, width, height, depth: false },
-        medium: Medium {
-            opacity_distance: mean_free_path
-                .or(section.opacity_distance.map(|distance| distance.0))
-                .unwrap_or(texel_along_w),
-            lod_footprint: section.lod_footprint.0,
-        },
+        medium: Medium { opacity_distance, lod_footprint: section.lod_footprint.0 },
         march: match file.march.plan {
             Plan::Default => March::Default { step: file.march.step.0 },
             Plan::Paper => March::Paper { samples: file.march.samples.0 },
@@ -611,7 +609,7 @@ recipe = "fog.toml"
                 found += 1;
             }
         }
-        assert_eq!(found, 4 + 7 + 5 + 2 + 3 + 7);
+        assert_eq!(found, 4 + 8 + 5 + 2 + 3 + 7);
         let text = Text::new("keys", format!("{SCENE}[[light]]\nunknown_key = 1"), &[]).unwrap();
         let message = text.parse::<SceneFile>(("mesh", "generator")).unwrap_err().to_string();
         let (_, documented) = DOCUMENTATION.split_once("\n## `[[light]]`").unwrap();

@@ -35,7 +35,7 @@ use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 use crate::shell::Shell;
-use crate::volume::Pyramid;
+use crate::volume::{Filter, Pyramid};
 
 /// A loaded scene: all that a method needs, whatever file it came from.
 #[derive(Debug, Clone)]
@@ -69,7 +69,7 @@ pub struct Medium {
     /// The path length, in world units, whose opacity, or optical depth, the texture's alpha is: see
     /// [`Quantity`](crate::volume::Quantity).
     pub opacity_distance: f64,
-    /// The filter footprint in pixels (1 = one pixel; 0 = always level 0).
+    /// How many pixels wide a texel of the level that is read is; 0 always reads level 0. See [`PIXEL_FOOTPRINT`].
     ///
     /// At a point at depth `z` (world units along the camera's forward axis) in a tetrahedron the level of
     /// detail is `log2(lod_footprint * z * pixel * rho)`, clamped to `0..=last level`, where `pixel` is
@@ -78,6 +78,12 @@ pub struct Medium {
     /// premultiplied RGBA are blended linearly.
     pub lod_footprint: f64,
 }
+
+/// The footprint at which a texture is as sharp as the pixels: a texel of the level read is `1 / sqrt(3)` pixels wide.
+///
+/// A pixel's box of width `p` has the variance `p^2 / 12`. A texel of width `t` is a mean over a box itself, `t^2 / 12`, and its
+/// linear interpolation spreads it by a tent of twice its width, `t^2 / 6`; together `t^2 / 4`.
+pub const PIXEL_FOOTPRINT: f64 = 0.577_350_269_189_625_8;
 
 /// How samples are spread along a ray in one tetrahedron.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -94,7 +100,8 @@ pub enum March {
         step: f64,
     },
     /// Cell by cell of texel centres, where the texture is a cubic along the ray, by three-point Gauss-Legendre.
-    /// Optical depth is exact where the texture holds extinction.
+    /// Optical depth is exact where the texture holds extinction. Tetrahedra in cycles are marched by midpoints all the same,
+    /// eight a texel.
     Exact,
 }
 
@@ -117,7 +124,34 @@ impl Default for March {
     }
 }
 
+/// The mean lengths, in world units, of the edges of a texel along u, v and w, where a texture of `size` texels fills the
+/// shell: of all tetrahedra that the texture is not flat in, weighted by volume.
+pub fn texel_edges(shell: &Shell, size: [u32; 3]) -> [f64; 3] {
+    let mut edges = DVec3::ZERO;
+    let mut volume = 0.0;
+    for (cell, vertices) in shell.cells.iter().zip(&shell.topology.tetrahedra) {
+        let world_from_texture = cell.texture_from_world.inverse();
+        if world_from_texture.is_finite() {
+            let [a, b, c, d] = vertices.map(|vertex| shell.vertices[vertex as usize]);
+            let weight = (b - a).cross(c - a).dot(d - a).abs();
+            let [u, v, w] = [0, 1, 2].map(|axis| world_from_texture.col(axis).length());
+            edges += weight * DVec3::new(u, v, w);
+            volume += weight;
+        }
+    }
+    // Nowhere is there a texel: any length will do.
+    let edges = if volume > 0.0 { edges / volume } else { DVec3::ONE };
+    [0, 1, 2].map(|axis| edges[axis] / f64::from(size[axis]))
+}
+
 impl Scene {
+    /// The pyramid above the same full volume by another filter.
+    pub fn filtered(&self, filter: Filter) -> Pyramid {
+        let full = self.volume.levels[0].clone();
+        let texel = texel_edges(&self.shell, full.size).map(|edge| edge / self.medium.opacity_distance);
+        Pyramid::build_with(full, filter, texel)
+    }
+
     /// A shell filled with a texture, whose opacity is that of a path of `opacity_distance` world units: all of
     /// it in a picture of 512 x 512 pixels, at the default level of detail and step.
     pub fn new(shell: Shell, volume: Pyramid, opacity_distance: f64) -> Self {
@@ -125,7 +159,7 @@ impl Scene {
         Self {
             shell,
             volume,
-            medium: Medium { opacity_distance, lod_footprint: 1.0 },
+            medium: Medium { opacity_distance, lod_footprint: PIXEL_FOOTPRINT },
             shading: None,
             view: View { camera, width: 512, height: 512, depth: false },
             march: March::default(),

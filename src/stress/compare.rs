@@ -25,8 +25,8 @@ pub const ROUNDING: f64 = 1.0 / (1 << 24) as f64;
 /// By how many radians rounding turns a ray: see the head of this file.
 const TURN: f64 = 8.0 * ROUNDING;
 
-/// An error of transmittance that no rounding explains: a tetrahedron was left out, or counted twice. It is four times what
-/// snapping alone would make of the media compared here.
+/// An error of transmittance that no rounding explains: a tetrahedron was left out, or counted twice. It is four times the
+/// worst that rounding was seen to make of the media compared here.
 pub const LOST: f64 = 2e-3;
 
 /// What one picture of a constant medium showed.

@@ -62,7 +62,7 @@ fn rays_through_features_lost(stand: &Stand<'_>) -> Result<f64> {
     Ok(lost as f64)
 }
 
-/// The eye in the plane of the outer faces, then 1e-8 and 1e-6 radians off it, on both sides, so that rays run along faces
+/// The eye in the plane of the outer faces, then 1e-8 radians off it on both sides, and 1e-6 on one, so that rays run along faces
 /// over the whole plate; the same for the walls of prisms.
 fn grazing(stand: &Stand<'_>) -> Result<f64> {
     let pixels = stand.either(96, 384);

@@ -135,12 +135,12 @@ fn relative_error(stand: &Stand<'_>, scene: Scene) -> Result<f64> {
     Ok(errors.fold(0.0, |worst, error| if error.is_nan() { f64::INFINITY } else { worst.max(error) }))
 }
 
-/// A path a million opacity distances long, of alpha 1e-8, so of an optical depth of 0.01, in steps of half a texel that end at
-/// the most that are taken in a tetrahedron.
+/// A path a million opacity distances long, of alpha 1e-8, so of an optical depth of 0.01, in steps of a sixteenth of a texel, so
+/// at the most that are taken in a tetrahedron.
 ///
-/// The bound: entry and exit, at 3 and 2 from the eye, are rounded some four times each, which is 40 * 2^-24 of the length of 1;
-/// some 16 more roundings make the opacity. Adding up the samples must not add more than these: 64 * 2^-24 is 4e-6.
-const THIN_PATH: f64 = 64.0 * ROUNDING;
+/// The bound: entry and exit, at 3 and 2 from the eye, are rounded some four times each, which is 20 * 2^-24 of the length of 1;
+/// some 16 more roundings make the opacity. Adding up the samples must not add anything: 36 * 2^-24 is 2e-6.
+const THIN_PATH: f64 = 36.0 * ROUNDING;
 
 fn thin_path(stand: &Stand<'_>) -> Result<f64> {
     let mesh = Generator::Plane(Plane { size: 2.0, segments: 1 }).build()?;
@@ -185,10 +185,11 @@ fn thin_layers(stand: &Stand<'_>) -> Result<f64> {
 /// Optical depths from 1e-6 to 1e6 through one plate.
 ///
 /// The bound: the length of 0.5 lies between 2 and 2.5 from the eye, so its ends' roundings, four each, are 36 * 2^-24 of it.
-/// Opacity follows with the same relative error at most, and some 16 roundings of its own; beyond an optical depth of 1/32 it
-/// is 1 - exp(-depth), where exp may be off by two: 64 * 2^-24 of 1/32. The logarithm of 1 - alpha may be off by 2^-21 ln 2 by the
-/// Vulkan specification, which is 20 * 2^-24 of its value at the least alpha that it is taken of, 1/4.
-const DEPTH_RANGE: f64 = (36.0 + 16.0 + 64.0 + 20.0) * ROUNDING;
+/// Opacity follows with the same relative error at most, and some 16 roundings of its own. Vulkan lets exp(-x) be off by 3 + 2 x
+/// units in the last place: next to 1 that is at most 3.1 * 2^-24, and 98 times 2^-24 of the least opacity that is made so, of
+/// a depth of 1/32. It lets the logarithm of 1 - alpha be off by 2^-21, which is 28 * 2^-24 of it at the least alpha that
+/// it is taken of, 1/4.
+const DEPTH_RANGE: f64 = (36.0 + 16.0 + 98.0 + 28.0) * ROUNDING;
 
 fn depth_range(stand: &Stand<'_>) -> Result<f64> {
     let mesh = Generator::Plane(Plane { size: 2.0, segments: 2 }).build()?;

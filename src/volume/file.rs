@@ -4,7 +4,7 @@ use std::io::Read as _;
 use std::path::Path;
 
 use super::raw::{open, unreadable};
-use super::{AlphaMode, RawVolume, Volume, VolumeInfo, ktx2_file, nrrd, recipe, stack};
+use super::{RawVolume, VolumeInfo, ktx2_file, nrrd, recipe, stack};
 use crate::{Error, Result};
 
 const PNG_MAGIC: &[u8] = b"\x89PNG\r\n\x1a\n";
@@ -40,21 +40,23 @@ pub fn read(path: &Path) -> Result<RawVolume> {
 /// # Errors
 /// As [`read`], and as [`recipe::load`] and [`Recipe::build`](recipe::Recipe::build).
 pub fn info(path: &Path) -> Result<VolumeInfo> {
-    let is_recipe =
-        path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("toml")) && !path.is_dir();
-    if !is_recipe {
-        return Ok(read(path)?.info());
+    Ok(read_or_make(path)?.info())
+}
+
+/// Reads a volume file as [`read`] does, or computes a recipe, which is a file whose name ends in `.toml`.
+///
+/// # Errors
+/// As [`read`], and as [`recipe::load`] and [`Recipe::build`](recipe::Recipe::build).
+pub fn read_or_make(path: &Path) -> Result<RawVolume> {
+    if !is_recipe(path) {
+        return read(path);
     }
     let recipe = recipe::load(path)?;
-    let Volume { size, texels, .. } = recipe.build()?;
-    let raw = RawVolume {
-        path: path.to_owned(),
-        format: format!("recipe \"{}\"", recipe.header().recipe),
-        size,
-        channels: 4,
-        values: texels.into_flattened(),
-        full_scale: 1.0,
-        alpha_mode: AlphaMode::Premultiplied,
-    };
-    Ok(raw.info())
+    let format = format!("recipe \"{}\"", recipe.header().recipe);
+    Ok(RawVolume::of(recipe.build()?, path, format))
+}
+
+/// Whether a path is that of a recipe.
+pub fn is_recipe(path: &Path) -> bool {
+    path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("toml")) && !path.is_dir()
 }

@@ -72,7 +72,7 @@ impl Volume {
                     path,
                     "has one value a texel, and nothing says which colour and opacity it means",
                 );
-                return Err(error.with_help("add a transfer function under [volume.transfer]"));
+                return Err(error.with_help("add a transfer function under [volume.transfer], or say how dense it is under [volume.density]"));
             }
             (3, _, None) => {
                 let error = Error::input(path, "has red, green and blue, but no opacity");

@@ -162,8 +162,7 @@ pub fn write_volume(path: &Path, volume: &Volume) -> Result<()> {
 /// # Errors
 /// [`Error::Usage`] where the format cannot hold a value, [`Error::Output`] where the file cannot be written.
 pub fn write_raw(path: &Path, raw: &RawVolume, sample: Sample) -> Result<()> {
-    let normalised = matches!(sample, Sample::Unorm8 | Sample::Srgb8 | Sample::Unorm16);
-    let scale = if raw.channels > 1 || normalised { raw.full_scale } else { 1.0 };
+    let scale = stored_unit(raw, sample);
     let scaled = || raw.values.iter().map(|value| value / scale);
     if let Some(value) = scaled().find(|&value| !sample.can_store(value)) {
         let message = format!("{}: {sample:?} cannot hold the value {value}", raw.path.display());
@@ -171,6 +170,12 @@ pub fn write_raw(path: &Path, raw: &RawVolume, sample: Sample) -> Result<()> {
     }
     let texels = sample.encode(scaled(), raw.channels);
     write_texture(path, raw.size, sample, raw.channels, raw.alpha_mode, &texels)
+}
+
+/// The value of `raw` that is stored as 1.
+pub(super) fn stored_unit(raw: &RawVolume, sample: Sample) -> f32 {
+    let normalised = matches!(sample, Sample::Unorm8 | Sample::Srgb8 | Sample::Unorm16);
+    if raw.channels > 1 || normalised { raw.full_scale } else { 1.0 }
 }
 
 fn write_texture(

@@ -1,9 +1,11 @@
 //! Volumes: RGBA 3D textures, their files, recipes and mip pyramids.
 
+mod contact;
 mod directions;
 mod file;
 mod interpretation;
 mod ktx2_file;
+mod loss;
 mod nrrd;
 mod pyramid;
 mod raw;
@@ -11,11 +13,15 @@ pub mod recipe;
 mod sample;
 mod stack;
 mod transfer;
+pub mod voxelize;
 
+pub use contact::contact_sheet;
 pub use directions::{DirectionLevel, Directions};
-pub use file::{info, read};
+pub use file::{info, is_recipe, read, read_or_make};
 pub use interpretation::Interpretation;
 pub use ktx2_file::{write_raw, write_volume};
+pub use loss::Loss;
+pub use pyramid::Filter;
 pub use raw::{AlphaMode, ChannelRange, RawVolume, VolumeInfo};
 pub use sample::Sample;
 pub use transfer::{ControlPoint, InvalidTransferFunction, TransferFunction};
@@ -112,7 +118,8 @@ impl std::fmt::Display for Channel {
 }
 
 impl Volume {
-    /// A volume of `size` texels along u, v, w, whose `texels` are `[r a, g a, b a, a]`, u fastest, with opacities.
+    /// A volume of `size` texels along u, v, w, whose `texels` are `[r a, g a, b a, a]`, u fastest, with opacities. Colour where
+    /// alpha is 0 would not be seen, and is dropped.
     ///
     /// # Errors
     /// The first of the ranges promised by [`Volume`]'s fields that is broken, and where.
@@ -124,7 +131,7 @@ impl Volume {
     ///
     /// # Errors
     /// As [`Volume::new`].
-    pub fn of(quantity: Quantity, size: [u32; 3], texels: Vec<[f32; 4]>) -> Result<Self, InvalidVolume> {
+    pub fn of(quantity: Quantity, size: [u32; 3], mut texels: Vec<[f32; 4]>) -> Result<Self, InvalidVolume> {
         let most = if quantity == Quantity::Opacity { 1.0 } else { f32::MAX };
         let count = texel_count(size).ok_or(InvalidVolume::Size { size })?;
         if count != texels.len() {
@@ -141,6 +148,7 @@ impl Volume {
                 return Err(InvalidVolume::Value { at: texel_at(size, index), channel, value });
             }
         }
+        texels.iter_mut().filter(|texel| texel[3] == 0.0).for_each(|texel| *texel = [0.0; 4]);
         Ok(Self { size, texels, quantity })
     }
 

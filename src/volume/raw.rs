@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
-use super::{texel_at, texel_count};
+use super::{Volume, texel_at, texel_count};
 use crate::{Error, Result, input};
 
 /// The most texels that a file may have: 4 GiB as RGBA in f32. A few kilobytes of compressed zeros can
@@ -72,6 +72,20 @@ pub struct ChannelRange {
 }
 
 impl RawVolume {
+    /// The numbers of a volume that was computed, not read; `path` is where its recipe or its like was.
+    pub fn of(volume: Volume, path: &Path, format: String) -> Self {
+        let Volume { size, texels, .. } = volume;
+        Self {
+            path: path.to_owned(),
+            format,
+            size,
+            channels: 4,
+            values: texels.into_flattened(),
+            full_scale: 1.0,
+            alpha_mode: AlphaMode::Premultiplied,
+        }
+    }
+
     /// The same numbers, once they are known to be finite and as many as the size says.
     pub(super) fn validated(self) -> Result<Self> {
         let Self { path, size, channels, values, .. } = &self;

@@ -24,6 +24,13 @@ use crate::reference::Reference;
 use crate::scene::{March, Scene};
 use crate::{Error, Result};
 
+/// What feeds the shaders.
+const METHOD_CODE: [&str; 3] = [
+    include_str!("../../method/shell/mod.rs"),
+    include_str!("../../method/shell/outline.rs"),
+    include_str!("../../method/shell/seen.rs"),
+];
+
 /// A march, and how far from the reference it was found to be.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Trial {
@@ -67,7 +74,8 @@ pub fn choose(
                         "no march meets an error of {max_error:e}: the best, {}, has one of {:.1e}",
                         best.march, best.error.rmse
                     ),
-                    help: Some(format!("accept {:.1e} or more", best.error.upper())),
+                    // A tenth more than written with two digits is never too little.
+                    help: Some(format!("accept {:.1e} or more", 1.1 * best.error.upper())),
                 });
             }
             Next::Try(march) => {
@@ -105,8 +113,11 @@ fn fingerprint(scene: &Scene, method: &Entry, setup: &Setup<'_>) -> Result<Finge
     for text in [&of_reference, method.name, &device.name, &device.driver] {
         builder = builder.bytes(text.as_bytes());
     }
-    for shader in [shaders::SHELL_FRAG, shaders::CYCLE_FRAG] {
+    for shader in [shaders::SHELL_VERT, shaders::SHELL_FRAG, shaders::CYCLE_VERT, shaders::CYCLE_FRAG] {
         builder = builder.numbers(shader.words());
+    }
+    for code in METHOD_CODE {
+        builder = builder.bytes(code.as_bytes());
     }
     Ok(builder.finish())
 }

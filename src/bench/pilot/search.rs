@@ -64,14 +64,14 @@ pub fn next(trials: &[Trial], max_error: f64) -> Next {
         }
         (Some((step, trial)), Some((too_long, failed))) => {
             let part = (aim / trial.error.upper()).ln() / (failed.error.upper() / trial.error.upper()).ln();
-            // A trial without any error, or with an infinite one, tells no slope.
+            // A trial without any error tells no slope.
             let part = if part.is_finite() { part.clamp(0.1, 0.9) } else { 0.5 };
             step * (too_long / step).powf(part)
         }
         (None, Some((too_long, failed))) => {
             let wanted = too_long * (aim / failed.error.upper()).sqrt().clamp(1.0 / LEAP, USED);
             match exact {
-                Some(exact) if meets(exact) => return Next::Done(*exact),
+                Some(exact) if meets(exact) && wanted < AS_LONG_AS_EXACT => return Next::Done(*exact),
                 None if wanted < AS_LONG_AS_EXACT => return Next::Try(March::Exact),
                 Some(exact) if *too_long <= FINEST => {
                     let nearest = |a: &&Trial, b: &&Trial| a.error.upper().total_cmp(&b.error.upper());
@@ -181,6 +181,19 @@ mod tests {
         assert!(best.error.rmse < 5e-7, "{best:?}");
         let (end, _) = search(1e-3, |_| f64::INFINITY);
         assert!(matches!(end, Next::Impossible(_)), "{end:?}");
+    }
+
+    #[test]
+    fn what_is_known_does_not_make_the_choice_dearer() {
+        let (_, mut trials) = search(1e-4, smooth);
+        trials.extend(search(6e-7, smooth).1);
+        let mut next_step = next(&trials, 3e-5);
+        while let Next::Try(march) = next_step {
+            let rmse = smooth(march);
+            trials.push(Trial { march, error: Estimate { rmse, standard_error: 0.05 * rmse } });
+            next_step = next(&trials, 3e-5);
+        }
+        assert!(matches!(next_step, Next::Done(Trial { march: March::Default { .. }, .. })), "{next_step:?}");
     }
 
     #[test]

@@ -51,6 +51,10 @@ impl Trials {
     pub fn add(&mut self, trial: Trial) -> Result<()> {
         self.contents.trials.push(trial);
         let Some(path) = &self.path else { return Ok(()) };
+        // JSON has no infinity.
+        if !trial.error.rmse.is_finite() {
+            return Ok(());
+        }
         let json = serde_json::to_vec_pretty(&self.contents).expect("numbers and strings");
         write_whole(path, |file| file.write_all(&json))
     }

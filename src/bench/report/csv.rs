@@ -68,7 +68,8 @@ pub fn table(results: &Results) -> String {
     lines.into_iter().map(text).collect()
 }
 
-fn quoted(field: &str) -> String {
+/// A field, in quotes where it needs them.
+pub fn quoted(field: &str) -> String {
     if field.contains([',', '"', '\r', '\n']) {
         format!("\"{}\"", field.replace('"', "\"\""))
     } else {

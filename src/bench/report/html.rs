@@ -4,9 +4,9 @@ use std::fmt::Write;
 
 use super::picture::{ErrorMap, data_uri, error_map, thumbnail};
 use super::{error_names, error_title, plot};
-use crate::bench::Results;
 use crate::bench::measure::Pictures;
 use crate::bench::results::{Curve, Point, SceneResults};
+use crate::bench::{Environment, Results};
 use crate::frame::Image;
 
 const STYLE: &str = include_str!("style.css");
@@ -14,11 +14,10 @@ const STYLE: &str = include_str!("style.css");
 /// The page, with the pictures of each scene.
 pub fn page(results: &Results, pictures: &[Pictures]) -> String {
     let environment = &results.environment;
-    let mut page = format!(
-        "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
-         <meta name=\"viewport\" content=\"width=device-width\">\n<meta name=\"color-scheme\" content=\"light dark\">\n\
-         <title>Time against error: {name}</title>\n<style>\n{STYLE}</style>\n</head>\n<body>\n\
-         <header><h1>Time against error</h1>\n<p>{name}, {date}, {device}: frames timed in {runs} interleaved rounds, \
+    let mut page = head(&format!("Time against error: {}", escape(&results.sweep.name)));
+    let _ = write!(
+        page,
+        "<header><h1>Time against error</h1>\n<p>{name}, {date}, {device}: frames timed in {runs} interleaved rounds, \
          errors against the f64 reference.</p></header>\n",
         name = escape(&results.sweep.name),
         date = escape(&environment.date),
@@ -28,11 +27,8 @@ pub fn page(results: &Results, pictures: &[Pictures]) -> String {
     for (scene, pictures) in results.scenes.iter().zip(pictures) {
         section(&mut page, scene, pictures);
     }
-    page += "<section>\n<h2>Measured on</h2>\n<table class=\"facts\">\n";
-    for (name, value) in environment.rows() {
-        let _ = writeln!(page, "<tr><th scope=\"row\">{name}</th><td>{}</td></tr>", escape(&value));
-    }
-    page + "</table>\n</section>\n<section class=\"notes\">\n<h2>How to read it</h2>\n\
+    page += &measured_on(environment, &results.sweep.define);
+    page + "<section class=\"notes\">\n<h2>How to read it</h2>\n\
         <p>Time is the wall time of a whole frame, sort and readback included, once the scene is loaded; a first frame is \
         left out. In each round every point of a scene is timed once, so that a machine that drifts hurts all alike. The \
         95th percentile of less than 20 runs is the slowest.</p>\n\
@@ -40,6 +36,25 @@ pub fn page(results: &Results, pictures: &[Pictures]) -> String {
         samples are those in each tetrahedron. Full marks are on the Pareto front: no other point is as fast and as \
         accurate. The order is the slope of log RMSE over log distance between samples, fitted where the RMSE is above \
         1e-6, below which it is rounding.</p>\n</section>\n</body>\n</html>\n"
+}
+
+/// The beginning of a page with that title, up to its body.
+pub fn head(title: &str) -> String {
+    format!(
+        "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
+         <meta name=\"viewport\" content=\"width=device-width\">\n<meta name=\"color-scheme\" content=\"light dark\">\n\
+         <title>{title}</title>\n<style>\n{STYLE}</style>\n</head>\n<body>\n"
+    )
+}
+
+/// The section that tells the machine, the program, and what was laid over every scene.
+pub fn measured_on(environment: &Environment, define: &[String]) -> String {
+    let mut section = "<section>\n<h2>Measured on</h2>\n<table class=\"facts\">\n".to_owned();
+    let defined = (!define.is_empty()).then(|| ("set in every scene", define.join("; ")));
+    for (name, value) in environment.rows().into_iter().chain(defined) {
+        let _ = writeln!(section, "<tr><th scope=\"row\">{name}</th><td>{}</td></tr>", escape(&value));
+    }
+    section + "</table>\n</section>\n"
 }
 
 /// Text that stands in HTML as it is.

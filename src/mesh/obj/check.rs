@@ -15,6 +15,20 @@ pub(super) struct Checked {
     /// Whether any face corner has texture coordinates, and the first line with one that has not.
     any_uv: bool,
     line_without_uv: Option<usize>,
+    /// The material files that are named.
+    pub material_files: Vec<MaterialFile>,
+    /// The materials that faces use, each once, with the first line that asks for it.
+    pub materials: Vec<(String, usize)>,
+    /// For each triangle of the faces' fans, the index of its material, if it has one.
+    pub triangle_materials: Vec<Option<u32>>,
+}
+
+/// A material file that an OBJ file names.
+pub(super) struct MaterialFile {
+    /// The line that names it.
+    pub line: usize,
+    /// As written.
+    pub name: String,
 }
 
 impl Checked {
@@ -43,6 +57,7 @@ pub(super) fn check(path: &Path, text: &str) -> Result<Checked> {
     // How many of each kind there are so far; the highest index used so far, and its line.
     let (mut counts, mut highest) = ([0; 3], [(0, 0); 3]);
     let mut faces = 0;
+    let mut material = None;
     let lines = text.lines().count();
     let is_cut_off = |line| line == lines && !text.ends_with('\n');
     let fail = |line: usize, message: String| {
@@ -78,6 +93,7 @@ pub(super) fn check(path: &Path, text: &str) -> Result<Checked> {
                     return Err(fail(line, format!("a face has {} corners, but needs three", words.len())));
                 }
                 faces += 1;
+                checked.triangle_materials.extend(std::iter::repeat_n(material, words.len() - 2));
                 for corner in &words {
                     let indices = corner_indices(corner, counts).map_err(|message| fail(line, message))?;
                     for (highest, index) in highest.iter_mut().zip(indices) {
@@ -90,6 +106,19 @@ pub(super) fn check(path: &Path, text: &str) -> Result<Checked> {
                     checked.has_normals &= indices[2].is_some();
                 }
                 words.len()
+            }
+            "mtllib" => {
+                checked.material_files.push(MaterialFile { line, name: words.join(" ") });
+                continue;
+            }
+            "usemtl" => {
+                let name = words.join(" ");
+                let known = checked.materials.iter().position(|(known, _)| *known == name);
+                material = Some(known.unwrap_or(checked.materials.len()) as u32);
+                if known.is_none() {
+                    checked.materials.push((name, line));
+                }
+                continue;
             }
             _ => continue,
         };
@@ -131,7 +160,7 @@ fn logical_lines(text: &str) -> impl Iterator<Item = (usize, String)> {
 }
 
 /// The first `count` words as numbers within ±[`LARGEST_COORDINATE`].
-fn check_numbers(words: &[&str], count: usize) -> Result<Vec<f64>, String> {
+pub(super) fn check_numbers(words: &[&str], count: usize) -> Result<Vec<f64>, String> {
     if words.len() < count {
         return Err(format!("there are {} numbers where {count} are needed", words.len()));
     }

@@ -3,7 +3,7 @@
 //!
 //! All objects and groups become one mesh. A face with more than three corners is cut into a fan from its
 //! first corner, which is right where the face is convex (or at least visible whole from that corner): concave
-//! faces must be triangulated by the program that exports them. Materials, smoothing groups,
+//! faces must be triangulated by the program that exports them. Materials matter to models alone; smoothing groups,
 //! points, lines and free-form surfaces are not read.
 //!
 //! `tobj` names no line in its errors, fills gaps in the texture coordinates with those of the corner
@@ -11,13 +11,18 @@
 //! `tobj` sees those that matter.
 
 mod check;
+mod materials;
+mod write;
 
 use std::io::Cursor;
 use std::path::Path;
 
-use glam::{DVec2, DVec3};
+use glam::{DVec2, DVec3, Vec3};
 
-use super::weld::weld;
+pub use write::write_model;
+
+use super::model::{Material, Model};
+use super::weld::{Welded, weld};
 use super::{Mesh, Projection, normals};
 use crate::{Error, Result, input};
 
@@ -52,34 +57,108 @@ pub fn load(path: impl AsRef<Path>, projection: Option<&Projection>) -> Result<M
 /// As [`load`].
 pub fn load_counted(path: impl AsRef<Path>, projection: Option<&Projection>) -> Result<Loaded> {
     let path = path.as_ref();
+    parse(path, &text(path)?, projection)
+}
+
+fn text(path: &Path) -> Result<String> {
     let bytes = input::bytes(path, LONGEST_FILE)
         .map_err(|error| Error::input(path, format!("cannot be read: {error}")))?;
-    // Only names and comments hold anything but ASCII, and they are not read.
-    parse(path, &String::from_utf8_lossy(&bytes), projection)
+    // Only names and comments hold anything but ASCII.
+    Ok(String::from_utf8_lossy(&bytes).into_owned())
+}
+
+/// What an OBJ file holds, checked, parsed and welded.
+struct Parsed {
+    checked: check::Checked,
+    file: tobj::Mesh,
+    welded: Welded,
+}
+
+impl Parsed {
+    /// Parses the text of an OBJ file; `path` is for errors.
+    fn new(path: &Path, text: &str) -> Result<Self> {
+        let checked = check::check(path, text)?;
+        let options = tobj::LoadOptions { triangulate: true, ..Default::default() };
+        // No line that names materials is left.
+        let no_material = |_: &Path| Err(tobj::LoadError::OpenFileFailed);
+        let (models, _) = tobj::load_obj_buf(&mut Cursor::new(&checked.text), &options, no_material)
+            .map_err(|error| Error::input(path, format!("is not a readable OBJ file: {error}")))?;
+        let Ok([tobj::Model { mesh: file, .. }]) = <[_; 1]>::try_from(models) else {
+            return Err(Error::input(path, "is not a readable OBJ file"));
+        };
+        let positions: Vec<DVec3> = file.positions.chunks_exact(3).map(DVec3::from_slice).collect();
+        let welded = weld(&positions, as_triangles(&file.indices));
+        if welded.triangles.is_empty() {
+            return Err(Error::input(path, "no face has three different positions")
+                .with_help("export the mesh again: all of its faces have collapsed"));
+        }
+        Ok(Self { checked, file, welded })
+    }
+
+    /// The file's texture coordinates for each triangle.
+    fn uvs(&self) -> Vec<[DVec2; 3]> {
+        let corners = as_triangles(&self.file.texcoord_indices);
+        let uv = |index: u32| DVec2::from_slice(&self.file.texcoords[2 * index as usize..]);
+        self.welded.triangle_sources.iter().map(|&source| corners[source as usize].map(uv)).collect()
+    }
+}
+
+/// Reads a model with its materials; or, where there is a `colour`, linear red, green and blue, in that one colour.
+///
+/// # Errors
+/// [`Error::Input`] when the file, a material file or a texture cannot be read or is damaged, when there are no faces, when a
+/// material is nowhere defined, and when a face with a texture has no texture coordinates.
+pub fn load_model(path: impl AsRef<Path>, colour: Option<Vec3>) -> Result<Model> {
+    let path = path.as_ref();
+    let parsed = Parsed::new(path, &text(path)?)?;
+    let checked = &parsed.checked;
+    let uvs = match checked.require_uvs(path) {
+        Ok(()) => parsed.uvs(),
+        Err(_) => vec![[DVec2::ZERO; 3]; parsed.welded.triangles.len()],
+    };
+    let Welded { positions, triangles, triangle_sources, .. } = parsed.welded;
+    let mut model = Model {
+        path: path.to_owned(),
+        positions,
+        triangle_materials: vec![0; triangles.len()],
+        triangles,
+        uvs,
+        // Where nothing says otherwise.
+        materials: vec![Material { colour: colour.unwrap_or(Vec3::ONE), texture: None }],
+    };
+    if colour.is_some() {
+        return Ok(model);
+    }
+    let mut known = materials::load(path, &checked.material_files)?;
+    for (name, line) in &checked.materials {
+        let material = known.remove(name).ok_or_else(|| {
+            Error::input(
+                path,
+                format!("line {line}: the material `{name}` is in none of the files that `mtllib` names"),
+            )
+            .with_help("export the materials too, or give one colour for all by --colour")
+        })?;
+        if material.texture.is_some() {
+            checked.require_uvs(path).map_err(|error| {
+                error.with_help(
+                    "export the model with texture coordinates, or give one colour for all by --colour",
+                )
+            })?;
+        }
+        model.materials.push(material);
+    }
+    let material = |&source: &u32| checked.triangle_materials[source as usize].map_or(0, |index| index + 1);
+    model.triangle_materials = triangle_sources.iter().map(material).collect();
+    Ok(model)
 }
 
 /// Parses the text of an OBJ file; `path` is for errors.
 fn parse(path: &Path, text: &str, projection: Option<&Projection>) -> Result<Loaded> {
-    let checked = check::check(path, text)?;
+    let parsed = Parsed::new(path, text)?;
+    let Parsed { checked, file, welded } = &parsed;
     if projection.is_none() {
         checked.require_uvs(path)?;
     }
-    let options = tobj::LoadOptions { triangulate: true, ..Default::default() };
-    // No line that names materials is left.
-    let no_material = |_: &Path| Err(tobj::LoadError::OpenFileFailed);
-    let (models, _) = tobj::load_obj_buf(&mut Cursor::new(&checked.text), &options, no_material)
-        .map_err(|error| Error::input(path, format!("is not a readable OBJ file: {error}")))?;
-    let [tobj::Model { mesh: file, .. }] = &models[..] else {
-        return Err(Error::input(path, "is not a readable OBJ file"));
-    };
-
-    let positions: Vec<DVec3> = file.positions.chunks_exact(3).map(DVec3::from_slice).collect();
-    let welded = weld(&positions, as_triangles(&file.indices));
-    if welded.triangles.is_empty() {
-        return Err(Error::input(path, "no face has three different positions")
-            .with_help("export the mesh again: all of its faces have collapsed"));
-    }
-
     let file_normals = checked.has_normals.then(|| {
         let corners = as_triangles(&file.normal_indices);
         let normal = |index: u32| DVec3::from_slice(&file.normals[3 * index as usize..]);
@@ -97,12 +176,9 @@ fn parse(path: &Path, text: &str, projection: Option<&Projection>) -> Result<Loa
 
     let uvs = match projection {
         Some(projection) => projection.uvs(&welded.positions, &welded.triangles),
-        None => {
-            let corners = as_triangles(&file.texcoord_indices);
-            let uv = |index: u32| DVec2::from_slice(&file.texcoords[2 * index as usize..]);
-            welded.triangle_sources.iter().map(|&source| corners[source as usize].map(uv)).collect()
-        }
+        None => parsed.uvs(),
     };
+    let Parsed { checked, file, welded } = parsed;
     let mesh = Mesh { positions: welded.positions, normals, triangles: welded.triangles, uvs };
     mesh.validate().map_err(|message| Error::input(path, message))?;
     let dropped_triangles = (file.indices.len() / 3 - mesh.triangles.len()) as u64;

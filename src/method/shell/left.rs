@@ -3,6 +3,7 @@
 
 use rayon::prelude::*;
 
+use super::seen::Seen;
 use crate::Result;
 use crate::progress::{Interrupt, Progress};
 use crate::reference::Reference;
@@ -11,11 +12,13 @@ use crate::scene::{Scene, View};
 /// Largest absolute error: that of f32 sums on the device.
 const TOLERANCE: f64 = 1e-6;
 
-/// Fills in the pixels of `rgba`, and of `depth` where it is wanted, that are not finite; returns how many they are.
+/// Fills in the pixels of `rgba`, and of `depth` where it is wanted, that are not finite although `seen` resolves them per pixel;
+/// returns how many they are. Elsewhere such a pixel is a fault, and stays.
 ///
 /// # Errors
 /// [`Error::Interrupted`](crate::Error::Interrupted) soon after the flag is set.
 pub fn fill(
+    seen: &Seen,
     scene: &Scene,
     view: &View,
     rgba: &mut [[f32; 4]],
@@ -23,7 +26,13 @@ pub fn fill(
     progress: &dyn Progress,
     interrupt: &Interrupt,
 ) -> Result<u64> {
-    let left: Vec<usize> = (0..rgba.len()).filter(|&pixel| !rgba[pixel][3].is_finite()).collect();
+    let place = |pixel: usize| ((pixel % view.width as usize) as u32, (pixel / view.width as usize) as u32);
+    let is_tiled = seen.is_tiled(view);
+    let is_left = |&pixel: &usize| {
+        let (x, y) = place(pixel);
+        !rgba[pixel][3].is_finite() && is_tiled(x, y)
+    };
+    let left: Vec<usize> = (0..rgba.len()).filter(is_left).collect();
     if left.is_empty() {
         return Ok(0);
     }
@@ -31,8 +40,8 @@ pub fn fill(
     let reference = Reference::new(scene, view).with_tolerance(TOLERANCE);
     let sample = |&pixel: &usize| {
         interrupt.check()?;
-        let (x, y) = (pixel % view.width as usize, pixel / view.width as usize);
-        Ok(reference.pixel(x as u32, y as u32))
+        let (x, y) = place(pixel);
+        Ok(reference.pixel(x, y))
     };
     let samples: Vec<_> = left.par_iter().map(sample).collect::<Result<_>>()?;
     for (&pixel, sample) in left.iter().zip(samples) {

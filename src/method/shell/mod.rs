@@ -198,8 +198,15 @@ impl Method for Shell {
             canvas.target.read(1).into_iter().map(mean).collect()
         });
         watch.lap("read");
-        let left =
-            left::fill(&self.scene, view, &mut rgba, depth.as_deref_mut(), &*self.progress, &self.interrupt)?;
+        let left = left::fill(
+            &seen,
+            &self.scene,
+            view,
+            &mut rgba,
+            depth.as_deref_mut(),
+            &*self.progress,
+            &self.interrupt,
+        )?;
         watch.lap("left");
         let mut report = self.report(&sorted, &seen, &rgba);
         report.counts.insert("pixels_left_to_host".to_owned(), left);
@@ -317,8 +324,8 @@ impl Shell {
     }
 }
 
-/// Samples that a ray takes in one tetrahedron at most: a bound of `sample_count` in `glsl/include/sample.glsl`, and of lavapipe,
-/// which ends all loops of a pixel there.
+/// Passes through loops that a ray makes in one tetrahedron at most: a bound of `sample_count` and `march_exactly` in
+/// `glsl/include`, and of lavapipe, which ends all loops of a pixel there.
 const MOST_SAMPLES: f64 = 65535.0;
 
 /// How many samples the plan wants along a ray that passes so many texels of the full volume in a tetrahedron, at most.
@@ -326,8 +333,8 @@ fn wanted_samples(march: March, texels: f64) -> f64 {
     match march {
         March::Default { step } => texels / step,
         March::Paper { samples } => f64::from(samples),
-        // A ray passes planes of texels on three axes.
-        March::Exact => 3.0 * texels,
+        // A ray passes planes of texels on three axes, of two levels, and each piece may be cut in 16.
+        March::Exact => 3.0 * (1.0 + 0.5) * 17.0 * texels,
     }
 }
 

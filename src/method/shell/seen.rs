@@ -2,6 +2,7 @@
 //! eye in f64 before anything is f32, so that a scene far from the origin loses nothing, and in parts of the scene's own reach, so
 //! that its scale changes nothing: not what f32 rounds, nor whether it overflows.
 
+use std::collections::HashSet;
 use std::ops::Range;
 
 use bytemuck::{Pod, Zeroable};
@@ -154,6 +155,22 @@ impl Seen {
             });
         }
         self.runs.push(Run::Cycle(first_tile..self.tiles.len() as u32));
+    }
+
+    /// Whether a pixel lies in a tile.
+    pub fn is_tiled(&self, view: &View) -> impl Fn(u32, u32) -> bool + use<> {
+        let columns = view.width.div_ceil(TILE);
+        let size = [f64::from(view.width), f64::from(view.height)];
+        let place = |tile: &Tile| {
+            let [x, y] = [0, 1].map(|axis| {
+                // Of a corner of whole pixels, in f32.
+                let pixel = (0.5 + 0.5 * f64::from(tile.bounds[axis])) * size[axis];
+                pixel.round() as u32 / TILE
+            });
+            y * columns + x
+        };
+        let tiles: HashSet<u32> = self.tiles.iter().map(place).collect();
+        move |x, y| tiles.contains(&(y / TILE * columns + x / TILE))
     }
 
     /// Keeps those that can be seen, counts the others.

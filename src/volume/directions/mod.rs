@@ -10,7 +10,7 @@ use std::path::Path;
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::pyramid::{coverage, texels_per_coarse};
+use super::pyramid::coverage::{coverage, texels_per_coarse};
 use super::{Volume, ktx2_file, texel_at};
 use crate::{Error, Result};
 
@@ -98,13 +98,13 @@ fn halved(finer: &DirectionLevel) -> DirectionLevel {
     let size = finer.size.map(|n| (n / 2).max(1));
     let [width, height] = [finer.size[0] as usize, finer.size[1] as usize];
     let count = size.into_iter().map(|n| n as usize).product();
-    let covered: f64 = finer.size.into_iter().map(texels_per_coarse).product();
+    let covered: f64 = (0..3).map(|axis| texels_per_coarse(finer.size[axis], size[axis])).product();
     let texel = |index| {
         let [u, v, w] = texel_at(size, index);
         let mut sum = [0.0; 4];
-        for (w, weight_w) in coverage(finer.size[2], w) {
-            for (v, weight_v) in coverage(finer.size[1], v) {
-                for (u, weight_u) in coverage(finer.size[0], u) {
+        for (w, weight_w) in coverage(finer.size[2], size[2], w) {
+            for (v, weight_v) in coverage(finer.size[1], size[1], v) {
+                for (u, weight_u) in coverage(finer.size[0], size[0], u) {
                     let weight = weight_u * weight_v * weight_w / covered;
                     let texel = finer.texels[(w as usize * height + v as usize) * width + u as usize];
                     for (sum, value) in sum.iter_mut().zip(texel) {

@@ -15,6 +15,7 @@ use super::Pattern;
 use super::grid::{Grid, lay_over, smoothstep};
 use super::keys::keys;
 use super::noise::{gradient, nearest_feature, random};
+use super::strand::{Nearest, POINTS, Strand};
 use crate::value::Colour;
 
 keys! {
@@ -59,33 +60,22 @@ keys! {
     }
 }
 
-/// Points of a strand's centre line, from root to tip.
-const POINTS: usize = 20;
-
-/// One strand, in tile widths; not wrapped.
-struct Strand {
-    points: [Vec3; POINTS],
-    /// Multiplies the strand's colour.
+/// One hair.
+struct Hair {
+    strand: Strand,
+    /// Multiplies the hair's colour.
     brightness: f32,
 }
 
-/// Where a point lies along a strand.
-struct Nearest {
-    /// 0 at the root, 1 at the tip.
-    along: f32,
-    /// To the centre line, in tile widths.
-    distance: f32,
-}
-
 impl Fur {
-    /// The strands, whatever the grid.
-    fn strands(&self, height: f32, seed: u32) -> Vec<Strand> {
-        (0..self.density).into_par_iter().map(|index| self.strand(index, height, seed)).collect()
+    /// The hairs, whatever the grid.
+    fn hairs(&self, height: f32, seed: u32) -> Vec<Hair> {
+        (0..self.density).into_par_iter().map(|index| self.hair(index, height, seed)).collect()
     }
 
-    fn strand(&self, index: u32, height: f32, seed: u32) -> Strand {
-        let mut random_of_strand = Pcg32::seed_from_u64(u64::from(seed) << 32 | u64::from(index));
-        let mut spread = |range: f32| range * random_of_strand.random_range(-1f32..1.);
+    fn hair(&self, index: u32, height: f32, seed: u32) -> Hair {
+        let mut random_of_hair = Pcg32::seed_from_u64(u64::from(seed) << 32 | u64::from(index));
+        let mut spread = |range: f32| range * random_of_hair.random_range(-1f32..1.);
         // Martin Roberts' R2 sequence spreads any number of roots evenly over a tile that repeats.
         let even = |step: f64| (f64::from(index) * step).fract() as f32;
         let jitter = 0.35 / (self.density as f32).sqrt();
@@ -116,69 +106,38 @@ impl Fur {
             let across = root + leaning * t.powf(1.6) + to_clump * self.clumping * t * t + curl;
             across.extend(top * t)
         });
-        Strand { points, brightness }
+        Hair { strand: Strand { points }, brightness }
     }
 
-    /// Adds the part of a strand that is near the slice at height `z`.
-    fn draw_strand(&self, strand: &Strand, grid: &Grid, z: f32, slice: &mut [[f32; 4]]) {
+    /// Adds the part of a hair that is near the slice at height `z`.
+    fn draw_hair(&self, hair: &Hair, grid: &Grid, z: f32, slice: &mut [[f32; 4]]) {
         let reach = self.thickness + grid.voxel();
-        let above = strand.points.partition_point(|point| point.z <= z + reach).min(POINTS - 1);
-        let below = strand.points.partition_point(|point| point.z < z - reach).saturating_sub(1);
-        let near = &strand.points[below..=above];
-        let last = strand.points[POINTS - 1].z;
-        if last < z - reach || near.len() < 2 {
-            return;
-        }
-        let low = near.iter().copied().reduce(Vec3::min).unwrap_or_default() - reach;
-        let high = near.iter().copied().reduce(Vec3::max).unwrap_or_default() + reach;
-        for (j, y) in grid.between(1, low.y, high.y) {
-            for (i, x) in grid.between(0, low.x, high.x) {
-                let position = Vec3::new(x, y, z);
-                let Some(nearest) = nearest_on(near, below, position, reach) else { continue };
-                let cover = self.cover_at(&nearest, grid.voxel());
-                if cover > 0. {
-                    let colour = self.colour_at(strand, nearest.along, z / grid.height);
-                    lay_over(&mut slice[j * grid.size[0] + i], colour, cover);
-                }
+        hair.strand.near_slice(grid, z, reach, slice, |nearest, texel| {
+            let cover = self.cover_at(nearest, grid.voxel());
+            if cover > 0. {
+                lay_over(texel, self.colour_at(hair, nearest.along, z / grid.height), cover);
             }
-        }
+        });
     }
 
-    /// How much of a voxel the strand fills. One thinner than a voxel is drawn a voxel wide, and fainter.
+    /// How much of a voxel the hair fills. One thinner than a voxel is drawn a voxel wide, and fainter.
     fn cover_at(&self, nearest: &Nearest, voxel: f32) -> f32 {
         let radius = self.thickness * (1. - self.taper * nearest.along);
         let thinness = (2. * radius / voxel).min(1.);
         let tip = smoothstep(1., 0.7, nearest.along);
-        thinness * tip * smoothstep(radius + voxel, radius - voxel, nearest.distance)
+        thinness * tip * smoothstep(radius + voxel, radius - voxel, nearest.offset.length())
     }
 
-    fn colour_at(&self, strand: &Strand, along: f32, level: f32) -> Vec3 {
+    fn colour_at(&self, hair: &Hair, along: f32, level: f32) -> Vec3 {
         let colour = Vec3::lerp(self.root_colour.0, self.tip_colour.0, smoothstep(0., 1., along));
         let light = 1. - self.occlusion * (1. - smoothstep(-0.05, 0.85, level));
-        colour * strand.brightness * light
+        colour * hair.brightness * light
     }
-}
-
-/// The nearest place on the centre line `points`, whose first is point `first` of its strand; none where it
-/// is farther than `reach`.
-fn nearest_on(points: &[Vec3], first: usize, position: Vec3, reach: f32) -> Option<Nearest> {
-    let mut squared = reach * reach;
-    let mut nearest = None;
-    for (index, ends) in points.windows(2).enumerate() {
-        let (edge, to) = (ends[1] - ends[0], position - ends[0]);
-        let t = (to.dot(edge) / edge.length_squared()).clamp(0., 1.);
-        let distance = (to - t * edge).length_squared();
-        if distance < squared {
-            squared = distance;
-            nearest = Some((first + index) as f32 + t);
-        }
-    }
-    nearest.map(|place| Nearest { along: place / (POINTS - 1) as f32, distance: squared.sqrt() })
 }
 
 impl Pattern for Fur {
     fn draw(&self, grid: &Grid, seed: u32, texels: &mut [[f32; 4]]) {
-        let strands = self.strands(grid.height, seed);
+        let hairs = self.hairs(grid.height, seed);
         let skin = self.skin_colour.0;
         grid.slices(texels, |k, slice| {
             let z = grid.position(0, 0, k).z;
@@ -186,8 +145,8 @@ impl Pattern for Fur {
             for texel in slice.iter_mut() {
                 lay_over(texel, skin * (1. - self.occlusion), cover);
             }
-            for strand in &strands {
-                self.draw_strand(strand, grid, z, slice);
+            for hair in &hairs {
+                self.draw_hair(hair, grid, z, slice);
             }
             for texel in slice {
                 *texel = texel.map(|channel| channel * self.opacity);

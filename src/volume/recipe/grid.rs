@@ -122,3 +122,13 @@ pub(super) fn lay_over(texel: &mut [f32; 4], colour: Vec3, alpha: f32) {
         *below = *below * (1. - alpha) + above;
     }
 }
+
+/// `colour` laid over a premultiplied texel, whose alpha grows to no more than `alpha`: things that crowd
+/// share a voxel, and the edge of the crowd is as soft as theirs.
+pub(super) fn lay_among(texel: &mut [f32; 4], colour: Vec3, alpha: f32) {
+    let fullest = texel[3].max(alpha);
+    lay_over(texel, colour, alpha);
+    let share = fullest / texel[3].max(f32::MIN_POSITIVE);
+    *texel = texel.map(|channel| channel * share);
+    texel[3] = fullest;
+}

@@ -11,29 +11,42 @@
 //! `"#rrggbb"` (sRGB) or `[red, green, blue]` (linear): see [`Colour`](crate::value::Colour). A recipe
 //! yields the same bytes whatever the number of threads, and its volume repeats in u and v without a seam.
 
+mod chain_mail;
 mod clouds;
+mod ellipsoids;
 mod fog;
 mod fur;
+mod grass;
 mod grid;
+mod height_map;
 mod keys;
 mod noise;
 mod rocks;
+mod scales;
+mod strand;
+mod trees;
 mod weave;
 
 use std::collections::BTreeMap;
 use std::fmt::Debug;
 use std::ops::Range;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use miette::NamedSource;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue, ValueDeserializer};
 
+pub use chain_mail::ChainMail;
 pub use clouds::Clouds;
+pub use ellipsoids::Ellipsoids;
 pub use fog::Fog;
 pub use fur::Fur;
+pub use grass::Grass;
+pub use height_map::HeightMap;
 pub use rocks::Rocks;
+pub use scales::Scales;
+pub use trees::Trees;
 pub use weave::Weave;
 
 use super::{Quantity, Volume};
@@ -47,10 +60,16 @@ pub const MAX_TEXELS: u64 = 1 << 28;
 
 /// Every recipe, by the name that a file calls it.
 const RECIPES: &[(&str, Reader)] = &[
+    ("chain-mail", read_pattern::<ChainMail>),
     ("clouds", read_pattern::<Clouds>),
+    ("ellipsoids", read_pattern::<Ellipsoids>),
     ("fog", read_pattern::<Fog>),
     ("fur", read_pattern::<Fur>),
+    ("grass", read_pattern::<Grass>),
+    ("height-map", |source, table| Ok(Arc::new(height_map::read(source, table)?))),
     ("rocks", read_pattern::<Rocks>),
+    ("scales", read_pattern::<Scales>),
+    ("trees", read_pattern::<Trees>),
     ("weave", read_pattern::<Weave>),
 ];
 
@@ -93,15 +112,24 @@ pub fn load(path: impl AsRef<Path>) -> Result<Recipe> {
     let path = path.as_ref();
     let text =
         input::text(path).map_err(|error| Error::input(path, format!("cannot read the recipe: {error}")))?;
-    parse(&path.display().to_string(), &text)
+    let folder = path.parent().unwrap_or(Path::new("")).to_path_buf();
+    parse_in(folder, &path.display().to_string(), &text)
 }
 
-/// Reads a recipe from TOML; `name` stands for the file in error messages.
+/// Reads a recipe from TOML; `name` stands for the file in error messages. Files that it names are relative to the
+/// working directory.
 ///
 /// # Errors
 /// [`Error::Text`], which underlines the spot: bad TOML, unknown keys, wrong types, values out of range.
+/// [`Error::Input`] where a file that the recipe names cannot be read.
 pub fn parse(name: &str, text: &str) -> Result<Recipe> {
-    let source = Source { text: Arc::new(NamedSource::new(name, text.to_owned()).with_language("toml")) };
+    parse_in(PathBuf::new(), name, text)
+}
+
+/// The same with the folder to which the files that the recipe names are relative.
+fn parse_in(folder: PathBuf, name: &str, text: &str) -> Result<Recipe> {
+    let source =
+        Source { folder, text: Arc::new(NamedSource::new(name, text.to_owned()).with_language("toml")) };
     let table = DeTable::parse(text).map_err(|error| source.toml_error(&error, None))?.into_inner();
     let (header, body): (DeTable, DeTable) =
         table.into_iter().partition(|(key, _)| Header::NAMES.contains(&key.get_ref().as_ref()));
@@ -167,8 +195,9 @@ fn read_pattern<T: Keys + Pattern + 'static>(source: &Source, table: DeTable) ->
     Ok(Arc::new(source.read::<T>(table)?))
 }
 
-/// The text of a recipe, to be quoted in errors.
+/// Where a recipe is from, and its text, to be quoted in errors.
 struct Source {
+    folder: PathBuf,
     text: Arc<NamedSource<String>>,
 }
 

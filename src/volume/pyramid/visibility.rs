@@ -1,0 +1,85 @@
+//! What part of the light from outside the shell reaches each texel: the weight of what is seen sideways.
+
+use rayon::prelude::*;
+
+use super::coverage::{coverage, texels_per_coarse};
+use super::medium::depth;
+use crate::volume::Volume;
+
+/// Rays come in at a slant, and their way down is as much longer: `int (1 / cos) cos / int cos` over the hemisphere.
+const MEAN_SLANT: f64 = 2.0;
+
+/// What is hidden has a colour nonetheless, for where the shell is cut open: it counts as if so much of it were seen.
+const LEAST: f64 = 1e-3;
+
+/// A number for each texel of a volume, or for each piece of a column of texels.
+pub struct Visibility {
+    size: [u32; 3],
+    parts: Vec<f32>,
+}
+
+impl Visibility {
+    /// Of the middle of each texel, through the layers above it, which are `layer` opacity distances thick.
+    pub fn from_above(volume: &Volume, layer: f64) -> Self {
+        let slice = volume.size[0] as usize * volume.size[1] as usize;
+        let mut parts = vec![0.0; volume.texels.len()];
+        let mut above = vec![0.0; slice];
+        for (parts, texels) in parts.chunks_mut(slice).zip(volume.texels.chunks(slice)).rev() {
+            let columns = parts.par_iter_mut().zip(texels).zip(&mut above);
+            columns.for_each(|((part, texel), above)| {
+                let within = MEAN_SLANT * layer * depth(f64::from(texel[3]), volume.quantity);
+                *part = (-(*above + 0.5 * within)).exp().max(LEAST) as f32;
+                *above += within;
+            });
+        }
+        Self { size: volume.size, parts }
+    }
+
+    /// Of one texel.
+    pub fn at(&self, [u, v, w]: [u32; 3]) -> f64 {
+        let [u, v, w] = [u, v, w].map(|i| i as usize);
+        f64::from(self.parts[(w * self.size[1] as usize + v) * self.size[0] as usize + u])
+    }
+
+    /// The means over the pieces of columns along an axis that is cut into `coarse`.
+    pub fn mean_along(&self, axis: usize, coarse: u32) -> Self {
+        let fine = self.size[axis];
+        let mut size = self.size;
+        size[axis] = coarse;
+        let [width, height] = [size[0] as usize, size[1] as usize];
+        let mean = |index: usize| {
+            let at = [index % width, index / width % height, index / width / height].map(|i| i as u32);
+            let parts = coverage(fine, coarse, at[axis]).map(|(texel, part)| {
+                let mut place = at;
+                place[axis] = texel;
+                part * self.at(place)
+            });
+            (parts.sum::<f64>() / texels_per_coarse(fine, coarse)) as f32
+        };
+        let count = width * height * size[2] as usize;
+        Self { size, parts: (0..count).into_par_iter().map(mean).collect() }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_lies_above_hides() {
+        let texel = |alpha: f32| [0.0, 0.0, 0.0, alpha];
+        let texels = [0.5, 0.0, 0.5, 1.0, 0.25, 0.0].map(texel).to_vec();
+        let visibility = Visibility::from_above(&Volume::new([2, 1, 3], texels).unwrap(), 0.5);
+        // From the top: a quarter, then half of the light is stopped, of a slanted ray through half an opacity distance.
+        let left = [0.75_f64.sqrt(), 0.75 * 0.5_f64.sqrt(), 0.75 * 0.5 * 0.5_f64.sqrt()];
+        for (w, expected) in [(2, left[0]), (1, left[1]), (0, left[2])] {
+            assert!((visibility.at([0, 0, w]) - expected).abs() < 1e-7);
+        }
+        assert_eq!(
+            [2, 1, 0].map(|w| visibility.at([1, 0, w])),
+            [1.0, f64::from(LEAST as f32), f64::from(LEAST as f32)]
+        );
+        let along = visibility.mean_along(0, 1);
+        assert!((along.at([0, 0, 2]) - 0.5 * (left[0] + 1.0)).abs() < 1e-7);
+    }
+}
