@@ -1,7 +1,7 @@
 //! Compiles every `glsl/*.STAGE.glsl` to SPIR-V with glslang; an error stops the build with file and line.
 //!
-//! A stage file may ask for variants by lines `// variant: NAME DEFINE`: it is then compiled once more, with
-//! `DEFINE` defined, as `NAME`. The result is a Rust file with one constant a shader, included by
+//! A stage file may ask for variants by lines `// variant: NAME DEFINE...`: it is then compiled once more, with
+//! each `DEFINE` defined, as `NAME`. The result is a Rust file with one constant a shader, included by
 //! `src/gpu/shaders.rs`.
 
 use std::fmt::Write as _;
@@ -61,7 +61,7 @@ fn compile_all(folder: &Path) -> Result<String, String> {
         for line in text.lines().filter_map(|line| line.strip_prefix("// variant: ")) {
             let (name, define) = line
                 .split_once(' ')
-                .ok_or_else(|| format!("{}: a variant is `// variant: NAME DEFINE`", path.display()))?;
+                .ok_or_else(|| format!("{}: a variant is `// variant: NAME DEFINE...`", path.display()))?;
             variants.push((name.to_owned(), Some(define)));
         }
         for (name, define) in variants {
@@ -109,7 +109,8 @@ fn compile(
         target: Target::Vulkan { version: VulkanVersion::Vulkan1_1, spirv_version: SpirvVersion::SPIRV1_3 },
         ..CompilerOptions::default()
     };
-    let defines: Vec<(&str, Option<&str>)> = define.iter().map(|name| (*name, Some("1"))).collect();
+    let defines: Vec<(&str, Option<&str>)> =
+        define.unwrap_or_default().split_whitespace().map(|name| (name, Some("1"))).collect();
     let mut includes = Includes(folder.join("include"));
     let input = ShaderInput::new(&source, stage, &options, Some(&defines[..]), Some(&mut includes))
         .map_err(|error| explain(&error))?;

@@ -1,6 +1,8 @@
 #version 450
 #extension GL_ARB_shading_language_include : require
 // variant: cycle_depth DEPTH
+// variant: cycle_lit LIT
+// variant: cycle_lit_depth LIT DEPTH
 // Resolves a cycle of tetrahedra per pixel: no order of them is right for all rays (Kraus and Ertl 2001, who sort the
 // members of such a cycle per pixel). Goes from one entry or exit on the ray to the next, with the members that are active
 // between the two; where several are (the shell overlaps itself) their media add. A pixel that is too much for that is left to
@@ -104,7 +106,10 @@ void main() {
                 vec3 wall = vec3(0.0);
                 for (uint hit = first; hit < end; hit++) {
                     if (spans[hit].y <= z) continue;
-                    vec4 texel = fetch(path_in(cells[hits[hit]].texture, ray), at);
+#ifdef LIT
+                    enter(hits[hit], cells[hits[hit]].planes, ray);
+#endif
+                    vec4 texel = radiant(path_in(cells[hits[hit]].texture, ray), at);
                     if (!EXTINCTION && texel.a >= 1.0) {
                         walls++;
                         wall += texel.rgb;

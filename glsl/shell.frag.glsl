@@ -1,6 +1,8 @@
 #version 450
 #extension GL_ARB_shading_language_include : require
 // variant: shell_depth DEPTH
+// variant: shell_lit LIT
+// variant: shell_lit_depth LIT DEPTH
 // Marches the segment of one ray in one tetrahedron.
 // Dufort, Leblanc, Poulin 2005, sections 4.2 and 4.3, with one change: entry and exit are not interpolated over the
 // front faces but found per pixel from the four planes, so that the rasteriser's snapping of vertices does not move them.
@@ -15,6 +17,9 @@
 
 layout(location = 0) flat in vec4 planes[4];
 layout(location = 4) flat in vec4 texture_rows[3];
+#ifdef LIT
+layout(location = 7) flat in uint cell_index;
+#endif
 
 layout(location = 0) out vec4 out_rgba; // premultiplied
 #ifdef DEPTH
@@ -26,6 +31,9 @@ void main() {
     vec2 segment = interval(planes, ray);
     if (!(segment.y > segment.x)) discard;
 
+#ifdef LIT
+    enter(cell_index, planes, ray);
+#endif
     Light light = Light(Gathered(vec4(0.0), vec4(0.0)), 0.0);
     march(path_in(texture_rows, ray), segment, length(ray) * view.per_opacity_distance, light);
     out_rgba = light.gathered.rgba;

@@ -1,5 +1,6 @@
 #version 450
 #extension GL_ARB_shading_language_include : require
+// variant: shell_lit LIT
 // The outline of a tetrahedron as two triangles; what shell.frag.glsl needs of it goes along unchanged.
 
 #include "shell.glsl"
@@ -8,6 +9,9 @@ layout(set = 0, binding = 0, std430) readonly buffer Cells { Cell cells[]; }; //
 
 layout(location = 0) flat out vec4 planes[4];
 layout(location = 4) flat out vec4 texture_rows[3];
+#ifdef LIT
+layout(location = 7) flat out uint cell_index;
+#endif
 
 const uint CORNERS[6] = uint[](0, 1, 2, 0, 2, 3);
 
@@ -15,6 +19,9 @@ void main() {
     Cell cell = cells[gl_VertexIndex / 6];
     planes = cell.planes;
     texture_rows = cell.texture;
+#ifdef LIT
+    cell_index = gl_VertexIndex / 6;
+#endif
     uint corner = CORNERS[gl_VertexIndex % 6];
     vec4 pair = cell.outline[corner / 2];
     gl_Position = vec4(corner % 2 == 0 ? pair.xy : pair.zw, 0.0, 1.0);

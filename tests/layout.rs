@@ -5,6 +5,7 @@ use std::mem::offset_of;
 
 use mesoshell::gpu::shaders::{self, Spirv};
 use mesoshell::method::shell::ViewConstants;
+use mesoshell::method::shell::lit::{Frame, LightSource, Lighting, LitCell};
 use mesoshell::method::shell::seen::{Cell, Tile};
 use rspirv::binary::parse_words;
 use rspirv::dr::{Instruction, Loader, Module, Operand};
@@ -72,19 +73,78 @@ macro_rules! host {
     };
 }
 
+const UNLIT: [Spirv; 4] =
+    [shaders::SHELL_FRAG, shaders::SHELL_DEPTH_FRAG, shaders::CYCLE_FRAG, shaders::CYCLE_DEPTH_FRAG];
+const LIT: [Spirv; 4] = [
+    shaders::SHELL_LIT_FRAG,
+    shaders::SHELL_LIT_DEPTH_FRAG,
+    shaders::CYCLE_LIT_FRAG,
+    shaders::CYCLE_LIT_DEPTH_FRAG,
+];
+
+#[test]
+fn structs_of_lit_scenes_agree() {
+    for shader in LIT {
+        let (members, stride) = layout(shader, "LitCell");
+        assert_eq!(
+            (members, stride),
+            (host!(LitCell: frames, per_height), Some(size_of::<LitCell>() as u32))
+        );
+        let (members, stride) = layout(shader, "Frame");
+        assert_eq!((members, stride), (host!(Frame: columns), Some(size_of::<Frame>() as u32)));
+        let (members, stride) = layout(shader, "LightSource");
+        assert_eq!(
+            (members, stride),
+            (host!(LightSource: place, colour), Some(size_of::<LightSource>() as u32))
+        );
+        let mut lighting = host!(Lighting: world_from_view, ambient, diffuse, specular, shininess, count);
+        lighting.push(("sources".to_owned(), size_of::<Lighting>() as u32));
+        assert_eq!(layout(shader, "Lighting").0, lighting);
+    }
+}
+
+/// The descriptors of a shader: their bindings, sorted.
+fn bindings(shader: Spirv) -> Vec<u32> {
+    let mut loader = Loader::new();
+    parse_words(shader.words(), &mut loader).expect("glslang wrote it");
+    let module: Module = loader.module();
+    let binding = |i: &Instruction| {
+        (i.class.opcode == Op::Decorate && i.operands[1] == Operand::Decoration(Decoration::Binding))
+            .then(|| i.operands[2].unwrap_literal_bit32())
+    };
+    let mut bindings: Vec<u32> = module.annotations.iter().filter_map(binding).collect();
+    bindings.sort_unstable();
+    bindings
+}
+
+/// An unlit scene's shaders have nothing of what light needs: they are what they were before there was any.
+#[test]
+fn nothing_of_light_is_compiled_in_where_a_scene_is_unlit() {
+    let words = |shader: Spirv| String::from_utf8_lossy(bytemuck::cast_slice(shader.words())).into_owned();
+    for (unlit, lit) in UNLIT.into_iter().zip(LIT) {
+        for name in ["radiant", "frames", "lighting", "directions", "FIBRE"] {
+            assert!(!words(unlit).contains(name) && words(lit).contains(name), "{name}");
+        }
+    }
+    assert_eq!(bindings(shaders::SHELL_FRAG), [3]);
+    assert_eq!(bindings(shaders::SHELL_LIT_FRAG), [3, 4, 5, 6, 7]);
+    assert_eq!(bindings(shaders::CYCLE_FRAG), [0, 2, 3]);
+    assert_eq!(bindings(shaders::CYCLE_LIT_FRAG), [0, 2, 3, 4, 5, 6, 7]);
+}
+
 #[test]
 fn shell_structs_agree() {
     let constants = host!(ViewConstants: centre, pixel, near, texels, last_level, lod_scale, per_opacity_distance, step, samples);
     // The vertex shader reads no constants, but the fragment shaders do.
-    for shader in
-        [shaders::SHELL_FRAG, shaders::SHELL_DEPTH_FRAG, shaders::CYCLE_FRAG, shaders::CYCLE_DEPTH_FRAG]
-    {
+    for shader in UNLIT.into_iter().chain(LIT) {
         assert_eq!(layout(shader, "View").0, constants);
     }
     let (members, stride) = layout(shaders::SHELL_VERT, "Cell");
     assert_eq!(members, host!(Cell: outline, planes, texture));
     assert_eq!(stride, Some(size_of::<Cell>() as u32));
-    assert_eq!(layout(shaders::CYCLE_FRAG, "Cell"), (members, stride));
+    for shader in [shaders::SHELL_LIT_VERT, shaders::CYCLE_FRAG, shaders::CYCLE_LIT_FRAG] {
+        assert_eq!(layout(shader, "Cell"), (members.clone(), stride));
+    }
     let (members, stride) = layout(shaders::CYCLE_VERT, "Tile");
     assert_eq!(members, host!(Tile: bounds, members));
     assert_eq!(stride, Some(size_of::<Tile>() as u32));

@@ -9,6 +9,12 @@ struct Light {
 // Below this an alpha counts as none: quotients of denormal numbers are not numbers where they are flushed to zero.
 const float LEAST = 1e-30;
 
+#ifdef LIT
+#include "shade.glsl"
+#else
+#define radiant fetch // unlit, a texel's colour is what it sends out
+#endif
+
 // Straight colour times `amount` of opacity, of a texel whose colour is premultiplied by its own alpha or extinction.
 vec3 emitted(vec4 texel, float amount) {
     return texel.a > LEAST ? texel.rgb * (amount / texel.a) : vec3(0.0);
@@ -19,7 +25,7 @@ void march_midpoints(Path path, vec2 segment, float per_depth, uint count, inout
     float step = (segment.y - segment.x) / float(count);
     for (uint i = 0; i < count; i++) {
         float z = segment.x + (float(i) + 0.5) * step;
-        vec4 texel = fetch(path, z);
+        vec4 texel = radiant(path, z);
         float optical = extinction(texel) * max(step * per_depth, LEAST);
         float alpha = opacity(optical);
         light.depth += transmittance(light.gathered) * alpha * z;
@@ -66,7 +72,7 @@ void march_piece(Path path, float from, float to, float per_depth, float start, 
     float h = to - from;
     if (!(h > 0.0)) return; // a sixteenth of some roundings
     vec3 z = from + h * GAUSS_NODES;
-    vec4 texels[3] = vec4[](fetch(path, z.x), fetch(path, z.y), fetch(path, z.z));
+    vec4 texels[3] = vec4[](radiant(path, z.x), radiant(path, z.y), radiant(path, z.z));
     vec3 sigma = vec3(extinction(texels[0]), extinction(texels[1]), extinction(texels[2])) * per_depth;
     float whole = h * dot(GAUSS_WEIGHTS, sigma);
     vec3 until = h * (CUMULATIVE_START * start * per_depth + CUMULATIVE * sigma);

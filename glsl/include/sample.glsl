@@ -9,7 +9,11 @@ layout(constant_id = 1) const bool MINIFIED = true; // whether any level but 0 c
 
 layout(constant_id = 2) const bool EXTINCTION = false; // what the fourth channel holds; else opacity
 
+#ifdef LIT
+layout(set = 0, binding = 6) uniform sampler3D volume; // premultiplied
+#else
 layout(set = 0, binding = 3) uniform sampler3D volume; // premultiplied
+#endif
 
 // The texture along a ray: affine in depth.
 struct Path {

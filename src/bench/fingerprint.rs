@@ -7,15 +7,16 @@ use bytemuck::NoUninit;
 use serde::{Deserialize, Serialize};
 
 use crate::reference::TOLERANCE;
-use crate::scene::{Scene, View};
-use crate::volume::{Quantity, Volume};
+use crate::scene::{Light, Model, Scene, Shading, Source, View};
+use crate::volume::{DirectionLevel, Quantity, Volume};
 
 /// The code that a cached reference comes from: were it changed, so might its pictures be.
-const REFERENCE_CODE: [(&str, &str); 6] = [
+const REFERENCE_CODE: [(&str, &str); 7] = [
     ("crossing.rs", include_str!("../reference/crossing.rs")),
     ("integrate.rs", include_str!("../reference/integrate.rs")),
     ("mod.rs", include_str!("../reference/mod.rs")),
     ("quadrature.rs", include_str!("../reference/quadrature.rs")),
+    ("shade.rs", include_str!("../reference/shade.rs")),
     ("supersample.rs", include_str!("../reference/supersample.rs")),
     ("texture.rs", include_str!("../reference/texture.rs")),
 ];
@@ -63,7 +64,7 @@ impl Fingerprint {
         Builder(blake3::Hasher::new()).bytes(kind.as_bytes())
     }
 
-    /// Of everything that the reference's picture of `view` depends on: geometry, texture, medium, camera, and the
+    /// Of everything that the reference's picture of `view` depends on: geometry, texture, medium, light, camera, and the
     /// reference itself. How finely a method marches is not among it.
     pub fn of_reference(scene: &Scene, view: &View) -> Self {
         let builder = Self::builder("reference").numbers(&[TOLERANCE, scene.medium.lod_footprint]);
@@ -105,16 +106,50 @@ fn seen(mut builder: Builder, scene: &Scene, view: &View, levels: &[Volume]) -> 
         };
         builder = builder.bytes(quantity.as_bytes()).numbers(&level.size).numbers(&level.texels);
     }
+    if let Some(shading) = &scene.shading {
+        builder = lit(builder, scene, shading, &shading.directions.levels[..levels.len()]);
+    }
     builder.finish()
+}
+
+/// Adds what the light is, and what it falls on.
+fn lit(builder: Builder, scene: &Scene, shading: &Shading, levels: &[DirectionLevel]) -> Builder {
+    let Shading { model, ambient, diffuse, specular, shininess, lights, directions: _ } = shading;
+    let model_name = match model {
+        Model::Surface => "surface",
+        Model::Fibre => "fibre",
+    };
+    let frames = scene.shell.frames(model.frame_kind());
+    let mut builder = builder
+        .bytes(model_name.as_bytes())
+        .numbers(&[*ambient])
+        .numbers(&[*diffuse, *specular, *shininess])
+        .numbers(&frames.maps)
+        .numbers(&frames.of_vertices);
+    for Light { source, colour } in lights {
+        builder = match source {
+            Source::Directional { towards } => builder.bytes(b"directional").numbers(&[*towards]),
+            Source::Point { position, falloff } => {
+                builder.bytes(b"point").numbers(&[*position]).numbers(&[falloff.unwrap_or(f64::INFINITY)])
+            }
+        }
+        .numbers(&[*colour]);
+    }
+    for level in levels {
+        builder = builder.numbers(&level.size).numbers(&level.texels);
+    }
+    builder
 }
 
 #[cfg(test)]
 pub(crate) mod tests {
+    use glam::DVec3;
+
     use super::*;
     use crate::mesh::generate::{Generator, Torus};
     use crate::scene::March;
     use crate::shell::{Shell, ShellOptions};
-    use crate::volume::Pyramid;
+    use crate::volume::{Directions, Pyramid};
 
     /// A torus of fog in 32 x 32 pixels.
     pub(crate) fn scene() -> Scene {
@@ -158,6 +193,60 @@ pub(crate) mod tests {
         }
         let finer = Scene { march: March::Paper { samples: 3 }, ..scene() };
         assert_eq!(original, print(&finer));
+    }
+
+    /// The same under a lamp and the sun.
+    fn lit() -> Scene {
+        let scene = scene();
+        let sun = Source::Directional { towards: DVec3::Y };
+        let lamp = Source::Point { position: DVec3::X, falloff: None };
+        let shading = Shading {
+            model: Model::Surface,
+            ambient: DVec3::splat(0.1),
+            diffuse: 1.0,
+            specular: 0.5,
+            shininess: 20.0,
+            lights: [sun, lamp].map(|source| Light { source, colour: DVec3::ONE }).to_vec(),
+            directions: Directions::normals(&scene.volume.levels[0]),
+        };
+        Scene { shading: Some(shading), ..scene }
+    }
+
+    /// A change of the light, and its name for the failure's sake.
+    type Relight = (&'static str, fn(&mut Shading));
+
+    const LIGHTS: &[Relight] = &[
+        ("the model", |shading| shading.model = Model::Fibre),
+        ("ambient light", |shading| shading.ambient.y += 1e-9),
+        ("the diffuse factor", |shading| shading.diffuse = 0.5),
+        ("the specular factor", |shading| shading.specular = 1.0),
+        ("the shininess", |shading| shading.shininess += 1e-9),
+        ("a light's direction", |shading| {
+            shading.lights[0].source = Source::Directional { towards: DVec3::X };
+        }),
+        ("a light's position", |shading| {
+            shading.lights[1].source = Source::Point { position: DVec3::Y, falloff: None };
+        }),
+        ("a light's falloff", |shading| {
+            shading.lights[1].source = Source::Point { position: DVec3::X, falloff: Some(1.0) };
+        }),
+        ("a light's colour", |shading| shading.lights[1].colour.z = 0.5),
+        ("a light less", |shading| shading.lights.truncate(1)),
+        ("a normal", |shading| shading.directions.levels[0].texels[3][1] += 1e-6),
+        ("a coarser normal", |shading| shading.directions.levels[1].texels[0][2] += 1e-6),
+    ];
+
+    #[test]
+    fn every_change_of_the_light_is_seen() {
+        let print = |scene: &Scene| Fingerprint::of_reference(scene, &scene.view);
+        let original = print(&lit());
+        assert_ne!(original, print(&scene()), "unlit");
+        assert_eq!(original, print(&lit()));
+        for (name, change) in LIGHTS {
+            let mut changed = lit();
+            change(changed.shading.as_mut().unwrap());
+            assert_ne!(original, print(&changed), "{name}");
+        }
     }
 
     #[test]

@@ -9,7 +9,7 @@ use super::device::{Gpu, vulkan_error};
 use super::format::Rgba;
 use super::image::{DeviceImage, whole};
 use super::submit::submit;
-use crate::volume::Pyramid;
+use crate::volume::{Directions, Pyramid};
 use crate::{Error, Result};
 
 /// A mip pyramid on the device, with its sampler.
@@ -36,6 +36,9 @@ const SAMPLING: Use = (
     vk::PipelineStageFlags::FRAGMENT_SHADER,
 );
 
+/// A mip level: its size, and its texels, u fastest.
+type Level<'a> = ([u32; 3], &'a [[f32; 4]]);
+
 impl Texture3d {
     /// Uploads all levels in the most accurate format that the device filters linearly.
     ///
@@ -45,10 +48,29 @@ impl Texture3d {
     /// # Panics
     /// Where the pyramid has no level, or levels of other sizes than a [`Pyramid`] promises.
     pub fn upload(gpu: &Arc<Gpu>, name: &'static str, pyramid: &Pyramid) -> Result<Self> {
+        let levels: Vec<Level<'_>> =
+            pyramid.levels.iter().map(|level| (level.size, level.texels.as_slice())).collect();
+        Self::upload_levels(gpu, name, &levels)
+    }
+
+    /// The same for directions.
+    ///
+    /// # Errors
+    /// As [`Texture3d::upload`].
+    ///
+    /// # Panics
+    /// As [`Texture3d::upload`].
+    pub fn upload_directions(gpu: &Arc<Gpu>, name: &'static str, directions: &Directions) -> Result<Self> {
+        let levels: Vec<Level<'_>> =
+            directions.levels.iter().map(|level| (level.size, level.texels.as_slice())).collect();
+        Self::upload_levels(gpu, name, &levels)
+    }
+
+    fn upload_levels(gpu: &Arc<Gpu>, name: &'static str, pyramid: &[Level<'_>]) -> Result<Self> {
         assert_is_pyramid(pyramid);
-        let [width, height, depth] = pyramid.levels[0].size;
-        let levels = u32::try_from(pyramid.levels.len()).expect("at most 32 levels");
-        let (format, bytes) = Self::check(gpu, name, pyramid.levels[0].size, levels)?;
+        let [width, height, depth] = pyramid[0].0;
+        let levels = u32::try_from(pyramid.len()).expect("at most 32 levels");
+        let (format, bytes) = Self::check(gpu, name, pyramid[0].0, levels)?;
         let mut staging = Buffer::staging(gpu, name, bytes)?;
         let info = vk::ImageCreateInfo::default()
             .image_type(vk::ImageType::TYPE_3D)
@@ -63,8 +85,8 @@ impl Texture3d {
 
         let mut regions = Vec::new();
         let mut offset = 0;
-        for (level, volume) in (0..levels).zip(&pyramid.levels) {
-            let [width, height, depth] = volume.size;
+        for (level, (size, texels)) in (0..levels).zip(pyramid) {
+            let [width, height, depth] = *size;
             regions.push(
                 vk::BufferImageCopy::default()
                     .buffer_offset(offset as u64)
@@ -76,7 +98,7 @@ impl Texture3d {
                     })
                     .image_extent(vk::Extent3D { width, height, depth }),
             );
-            let texels = format.encode(&volume.texels);
+            let texels = format.encode(texels);
             staging.write_bytes(offset, &texels);
             offset += texels.len();
         }
@@ -132,15 +154,15 @@ impl Texture3d {
 }
 
 /// Each level has the size that Vulkan gives a mip level, and as many texels.
-fn assert_is_pyramid(pyramid: &Pyramid) {
-    let full = pyramid.levels[0].size;
+fn assert_is_pyramid(pyramid: &[Level<'_>]) {
+    let full = pyramid[0].0;
     assert!(full.into_iter().all(|side| side > 0), "a volume of {full:?} texels");
     let most = most_levels(full);
-    assert!(pyramid.levels.len() <= most as usize, "a pyramid above {full:?} texels has {most} levels");
-    for (level, volume) in pyramid.levels.iter().enumerate() {
-        assert_eq!(volume.size, full.map(|side| (side >> level).max(1)), "level {level}");
-        let texels = volume.size.into_iter().map(|side| side as usize).product::<usize>();
-        assert_eq!(volume.texels.len(), texels, "level {level} of {:?} texels", volume.size);
+    assert!(pyramid.len() <= most as usize, "a pyramid above {full:?} texels has {most} levels");
+    for (level, (size, texels)) in pyramid.iter().enumerate() {
+        assert_eq!(*size, full.map(|side| (side >> level).max(1)), "level {level}");
+        let count = size.iter().map(|&side| side as usize).product::<usize>();
+        assert_eq!(texels.len(), count, "level {level} of {size:?} texels");
     }
 }
 

@@ -25,6 +25,7 @@ use glam::DVec3;
 
 use super::crossing::Crossing;
 use super::quadrature::{AtNodes, NODES, Rule, dot};
+use super::shade::{Lit, Surroundings};
 use super::texture::{ALPHA, CLEAR, Cubic, Lattice, Texel};
 use super::{Counts, Reference, Sample};
 use crate::scene::Scene;
@@ -48,6 +49,8 @@ struct Layer<'a> {
     /// Of the current piece.
     fine_cubic: Cubic,
     coarse_cubic: Cubic,
+    /// In a lit scene.
+    surroundings: Option<Surroundings<'a>>,
 }
 
 /// What a panel adds to the ray, as if nothing were in front of it.
@@ -73,6 +76,7 @@ struct Piece {
 /// Integrates along one ray.
 pub(super) struct RayIntegral<'a> {
     scene: &'a Scene,
+    lit: Option<&'a Lit<'a>>,
     rule: &'a Rule,
     direction: DVec3,
     /// World units per unit depth.
@@ -101,6 +105,7 @@ impl<'a> RayIntegral<'a> {
     ) -> (Sample, Counts) {
         let mut integral = Self {
             scene: reference.scene,
+            lit: reference.lit.as_ref(),
             rule: &reference.rule,
             direction,
             stretch: direction.length(),
@@ -197,6 +202,11 @@ impl<'a> RayIntegral<'a> {
             coarse: is_between.then(|| Lattice::new(&levels[level + 1], texture, slope)),
             fine_cubic: Cubic::EMPTY,
             coarse_cubic: Cubic::EMPTY,
+            surroundings: self.lit.map(|lit| {
+                let lattice = |level: usize| Lattice::new(&lit.directions().levels[level], texture, slope);
+                let coarse = is_between.then(|| lattice(level + 1));
+                lit.surroundings(tetrahedron, self.eye, self.direction, lattice(level), coarse)
+            }),
         }
     }
 
@@ -237,7 +247,7 @@ impl<'a> RayIntegral<'a> {
         let walls: Vec<_> = self.layers.iter().filter(|layer| layer.is_wall()).collect();
         let part = self.transmittance / walls.len() as f64;
         for layer in walls {
-            let texel = layer.at(0.0, depth);
+            let texel = layer.radiant(self.lit, 0.0, depth);
             for (sum, premultiplied) in self.colour.iter_mut().zip(texel) {
                 *sum += part * premultiplied;
             }
@@ -281,7 +291,7 @@ impl<'a> RayIntegral<'a> {
         for i in 0..NODES {
             let x = low + width * rule.nodes[i];
             for layer in &self.layers {
-                let texel = layer.at(x, piece.start + x * piece.length);
+                let texel = layer.radiant(self.lit, x, piece.start + x * piece.length);
                 let per_alpha = match quantity {
                     Quantity::Opacity => extinction_per_alpha(texel[ALPHA], texel[CLEAR]),
                     Quantity::Extinction => 1.0,
@@ -332,6 +342,9 @@ impl<'a> Layer<'a> {
         let coarse = self.coarse.as_mut().and_then(|lattice| lattice.cubic(from, to));
         self.fine_cubic = fine.unwrap_or(Cubic::EMPTY);
         self.coarse_cubic = coarse.unwrap_or(Cubic::EMPTY);
+        if let Some(surroundings) = &mut self.surroundings {
+            surroundings.load(from, to);
+        }
         fine.is_some() || coarse.is_some()
     }
 
@@ -339,13 +352,25 @@ impl<'a> Layer<'a> {
         self.fine_cubic.is_wall() && (self.coarse.is_none() || self.coarse_cubic.is_wall())
     }
 
-    /// The texture at `x` (0..1) of the piece, at depth `z`.
-    fn at(&self, x: f64, z: f64) -> Texel {
-        let fine = self.fine_cubic.at(x);
+    /// The texture at `x` (0..1) of the piece, at depth `z`, its colour as it is lit.
+    fn radiant(&self, lit: Option<&Lit<'_>>, x: f64, z: f64) -> Texel {
+        let texel = self.blend(z, || self.fine_cubic.at(x), || self.coarse_cubic.at(x));
+        match (lit, &self.surroundings) {
+            (Some(lit), Some(surroundings)) if texel[ALPHA] > 0.0 => {
+                let direction = self.blend(z, || surroundings.fine.at(x), || surroundings.coarse.at(x));
+                lit.shade(&texel, &direction, surroundings, z)
+            }
+            _ => texel,
+        }
+    }
+
+    /// Of a value in the finer level and in the coarser one that at the level of detail at depth `z`.
+    fn blend(&self, z: f64, fine: impl Fn() -> Texel, coarse: impl Fn() -> Texel) -> Texel {
+        let fine = fine();
         if self.coarse.is_none() {
             return fine;
         }
-        let coarse = self.coarse_cubic.at(x);
+        let coarse = coarse();
         let part = ((self.detail * z).log2() - self.level).clamp(0.0, 1.0);
         std::array::from_fn(|c| (1.0 - part) * fine[c] + part * coarse[c])
     }

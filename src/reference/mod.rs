@@ -11,6 +11,7 @@
 //!
 //! - `crossing`: which tetrahedra lie on a ray, by a bounding volume hierarchy and clipping;
 //! - `texture`: the texture along the ray, a cubic in each cell of texel centres;
+//! - `shade`: in a lit scene the colour that the texture has at a point;
 //! - `quadrature`: the nested rule of a panel;
 //! - `integrate`: the coupled integral along the ray, with its error control;
 //! - `supersample`: pixels of many rays, for filters to be measured against.
@@ -22,6 +23,7 @@
 mod crossing;
 mod integrate;
 mod quadrature;
+mod shade;
 mod supersample;
 mod texture;
 
@@ -40,6 +42,7 @@ use crate::scene::{Scene, View};
 use crossing::Crossings;
 use integrate::RayIntegral;
 use quadrature::Rule;
+use shade::Lit;
 
 /// Largest absolute error of premultiplied red, green, blue and alpha.
 pub const TOLERANCE: f64 = 1e-9;
@@ -60,8 +63,9 @@ pub struct Reference<'a> {
     view: View,
     lod_footprint: f64,
     tolerance: f64,
-    /// The largest colour (premultiplied by nothing) of any texel, at least 1.
+    /// The largest colour (premultiplied by nothing) of any point, at least 1.
     brightness: f64,
+    lit: Option<Lit<'a>>,
     rule: Rule,
     crossings: Crossings,
 }
@@ -92,6 +96,7 @@ impl<'a> Reference<'a> {
             lod_footprint: scene.medium.lod_footprint,
             tolerance: TOLERANCE,
             brightness: brightness(scene),
+            lit: Lit::of(scene),
             rule: Rule::new(),
             crossings: Crossings::new(&scene.shell, view),
         }
@@ -191,12 +196,16 @@ pub fn render(scene: &Scene, view: &View, progress: &dyn Progress, interrupt: &I
     Ok(Frame { image, depth, report })
 }
 
-/// The largest ratio of premultiplied colour to alpha over all texels that have alpha, at least 1. An
+/// The largest ratio of premultiplied colour to alpha over all texels that have alpha, at least 1, as it may be lit. An
 /// interpolated colour is a weighted mean of such ratios, so nothing in the scene is brighter.
 fn brightness(scene: &Scene) -> f64 {
     let texels = scene.volume.levels.par_iter().flat_map(|level| level.texels.par_iter());
     let visible = texels.filter(|texel| texel[3] > 0.0);
-    visible
+    let unlit = visible
         .map(|texel| f64::from(texel[0].max(texel[1]).max(texel[2])) / f64::from(texel[3]))
-        .reduce(|| 1.0, f64::max)
+        .reduce(|| 1.0, f64::max);
+    scene.shading.as_ref().map_or(unlit, |shading| {
+        let (factor, added) = shading.bounds();
+        (factor * unlit + added).max(1.0)
+    })
 }

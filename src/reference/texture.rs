@@ -9,9 +9,9 @@
 
 use glam::DVec3;
 
-use crate::volume::Volume;
+use crate::volume::{DirectionLevel, Volume};
 
-/// Premultiplied red, green, blue, then alpha, then `1 - alpha`.
+/// Premultiplied red, green, blue, then alpha, then `1 - alpha`; or of directions x, y, z times their weight, then the weight.
 pub type Texel = [f64; 5];
 
 /// Index of alpha in a [`Texel`].
@@ -40,10 +40,31 @@ impl Cubic {
     }
 }
 
+/// The texels of one level, u fastest.
+#[derive(Debug, Clone, Copy)]
+pub struct Texels<'a> {
+    /// Along u, v, w.
+    pub size: [u32; 3],
+    /// The last of the four is a weight of the others.
+    pub values: &'a [[f32; 4]],
+}
+
+impl<'a> From<&'a Volume> for Texels<'a> {
+    fn from(volume: &'a Volume) -> Self {
+        Self { size: volume.size, values: &volume.texels }
+    }
+}
+
+impl<'a> From<&'a DirectionLevel> for Texels<'a> {
+    fn from(level: &'a DirectionLevel) -> Self {
+        Self { size: level.size, values: &level.texels }
+    }
+}
+
 /// Where a ray meets the texel lattice of one level: visited cell by cell, front to back.
 #[derive(Debug, Clone)]
 pub struct Lattice<'a> {
-    volume: &'a Volume,
+    texels: Texels<'a>,
     /// The texel whose centre is the origin of `start`, before wrapping.
     base: DVec3,
     /// Lattice coordinates at the start of the span, relative to `base`, each in 0..1.
@@ -62,8 +83,9 @@ pub struct Lattice<'a> {
 
 impl<'a> Lattice<'a> {
     /// For a span that starts at the texture-space point `start` and moves by `slope` per unit depth.
-    pub fn new(volume: &'a Volume, start: DVec3, slope: DVec3) -> Self {
-        let size = DVec3::from_array(volume.size.map(f64::from));
+    pub fn new(texels: impl Into<Texels<'a>>, start: DVec3, slope: DVec3) -> Self {
+        let texels = texels.into();
+        let size = DVec3::from_array(texels.size.map(f64::from));
         let (start, slope) = (start * size - 0.5, slope * size);
         let base = start.floor();
         let start = start - base;
@@ -72,7 +94,7 @@ impl<'a> Lattice<'a> {
             if slope[i] > 0.0 || start[i] > 0.0 { f64::from(u8::from(slope[i] > 0.0)) } else { -1.0 }
         }));
         let mut lattice = Self {
-            volume,
+            texels,
             base,
             start,
             slope,
@@ -107,7 +129,7 @@ impl<'a> Lattice<'a> {
         }
     }
 
-    /// The reconstruction between two depths within one cell; `None` where it is empty.
+    /// The reconstruction between two depths within one cell, whatever was passed; `None` where it is empty.
     pub fn cubic(&mut self, from: f64, to: f64) -> Option<Cubic> {
         let cell = (self.start + self.slope * (0.5 * (from + to))).floor();
         if cell != self.cell {
@@ -136,7 +158,7 @@ impl<'a> Lattice<'a> {
     }
 
     fn load(&mut self, cell: DVec3) {
-        let size = self.volume.size;
+        let size = self.texels.size;
         let first = self.base + cell;
         // [axis][near or far]
         let index: [[usize; 2]; 3] = std::array::from_fn(|axis| {
@@ -151,7 +173,7 @@ impl<'a> Lattice<'a> {
         let slice = row * size[1] as usize;
         self.corners = std::array::from_fn(|corner| {
             let [u, v, w] = std::array::from_fn(|axis| index[axis][(corner >> axis) & 1]);
-            let [r, g, b, a] = self.volume.texels[u + v * row + w * slice].map(f64::from);
+            let [r, g, b, a] = self.texels.values[u + v * row + w * slice].map(f64::from);
             [r, g, b, a, 1.0 - a]
         });
         self.corners_are_empty = self.corners.iter().all(|texel| texel[..=ALPHA] == [0.0; 4]);

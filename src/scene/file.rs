@@ -10,13 +10,14 @@ use std::path::PathBuf;
 use serde::Deserialize;
 use toml::Spanned;
 
+use super::Model;
 use super::PIXEL_FOOTPRINT;
 use super::camera::DEFAULT_FOV_DEGREES;
 use crate::mesh::generate::Generator;
 use crate::mesh::projection::Projection;
 use crate::value::{
     Colour, Exactly, FieldOfView, Finite, Fraction, NotNegative, PictureSize, Pixels, Positive, Rounds,
-    Samples, Step,
+    Samples, Shininess, Step,
 };
 use crate::volume::{Filter, TransferFunction};
 
@@ -38,6 +39,11 @@ pub struct SceneFile {
     /// How finely the shell is marched.
     #[serde(default)]
     pub march: MarchSection,
+    /// How light is seen; without it the volume's colours are what it sends out. The span is the section's.
+    pub shading: Option<Spanned<ShadingSection>>,
+    /// The lights; the spans are those of the sections.
+    #[serde(default)]
+    pub light: Vec<Spanned<LightSection>>,
 }
 
 /// `[mesh]`: a generator or a file.
@@ -142,6 +148,41 @@ pub struct MarchSection {
     pub samples: Samples,
 }
 
+/// `[shading]`: see [`Shading`](super::Shading) for what the numbers mean.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct ShadingSection {
+    /// What the texture's directions are.
+    pub model: Model,
+    /// Light from everywhere.
+    pub ambient: Colour,
+    /// Factor on what is scattered.
+    pub diffuse: NotNegative,
+    /// Factor on what is mirrored.
+    pub specular: NotNegative,
+    /// How narrow the highlights are.
+    pub shininess: Shininess,
+    /// For a surface: a file of normals, relative to the scene file; by default they are derived.
+    pub normals: Option<Spanned<PathBuf>>,
+    /// For fibres: a file of tangents, relative to the scene file; by default they are derived.
+    pub tangents: Option<Spanned<PathBuf>>,
+}
+
+/// `[[light]]`: from a direction or at a position.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LightSection {
+    /// World space, not zero: where the light shines.
+    pub direction: Option<Spanned<Exactly<3, Finite>>>,
+    /// World space, not inside the camera.
+    pub position: Option<Exactly<3, Finite>>,
+    /// By default white.
+    #[serde(default = "white")]
+    pub colour: Colour,
+    /// With `position`: at which distance, in world units, half of it is left.
+    pub falloff: Option<Positive>,
+}
+
 /// How samples are spread.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -164,6 +205,24 @@ impl Default for MarchSection {
     fn default() -> Self {
         Self { plan: Plan::Default, step: Step(0.5), samples: Samples(10) }
     }
+}
+
+impl Default for ShadingSection {
+    fn default() -> Self {
+        Self {
+            model: Model::Surface,
+            ambient: Colour::linear(0.1, 0.1, 0.1),
+            diffuse: NotNegative(1.0),
+            specular: NotNegative(0.2),
+            shininess: Shininess(32.0),
+            normals: None,
+            tangents: None,
+        }
+    }
+}
+
+fn white() -> Colour {
+    Colour::linear(1.0, 1.0, 1.0)
 }
 
 fn no_rounds() -> Rounds {

@@ -7,6 +7,7 @@ use toml::Spanned;
 
 use super::camera::DEFAULT_NEAR;
 use super::file::{CameraSection, DensitySection, MeshSection, Plan, SceneFile, VolumeSection};
+use super::lighting::Lighting;
 use super::text::Text;
 use super::{Camera, March, Medium, Scene, Sizes, View, span, texel_edges};
 use crate::frame::{Stage, Stopwatch};
@@ -80,6 +81,7 @@ fn build(
     let camera = file.camera.as_ref().map(|section| camera(text, section)).transpose()?;
     let mesh = MeshSource::of(text, &file.mesh)?;
     let volume = VolumeSource::of(text, &file.volume, base_dir)?;
+    let lighting = Lighting::of(text, &file, base_dir)?;
     let [width, height] = file.image.size.0.map(|pixels| pixels.0);
     let admit = |volume| admit(&Sizes { picture: [width, height], volume });
     if let VolumeSource::Recipe(recipe) = &volume {
@@ -100,6 +102,10 @@ fn build(
         uv_offset: DVec2::from_array(shell.uv_offset.0.map(|x| x.0)),
     };
     let shell = Shell::build(&mesh, &options)?;
+    let camera = camera.unwrap_or_else(|| Camera::framing(&shell.vertices));
+    if let Some(lighting) = &lighting {
+        lighting.check_camera(text, &camera)?;
+    }
     stopwatch.lap("load.shell");
 
     progress.stage("loading the volume");
@@ -120,6 +126,14 @@ fn build(
     let texel_along_w = options.thickness / f64::from(volume.size[2]);
     stopwatch.lap("load.volume");
 
+    let shading = lighting.map(|lighting| {
+        progress.stage("finding the volume's directions");
+        let shading = lighting.shade(&volume);
+        stopwatch.lap("load.directions");
+        shading
+    });
+    let shading = shading.transpose()?;
+
     progress.stage("filtering the volume");
     let opacity_distance =
         mean_free_path.or(section.opacity_distance.map(|distance| distance.0)).unwrap_or(texel_along_w);
@@ -127,7 +141,6 @@ fn build(
     let volume = Pyramid::build_with(volume, section.filter, texel);
     stopwatch.lap("load.pyramid");
 
-    let camera = camera.unwrap_or_else(|| Camera::framing(&shell.vertices));
     let scene = Scene {
         view: View { camera, width, height, depth: false },
         medium: Medium { opacity_distance, lod_footprint: section.lod_footprint.0 },
@@ -136,6 +149,7 @@ fn build(
             Plan::Paper => March::Paper { samples: file.march.samples.0 },
             Plan::Exact => March::Exact,
         },
+        shading,
         shell,
         volume,
     };
@@ -256,6 +270,8 @@ fn camera(text: &Text, section: &CameraSection) -> Result<Camera> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene::{Light, Model, Source};
+    use crate::volume::{AlphaMode, RawVolume, Sample};
 
     const SCENE: &str = r#"
 [mesh]
@@ -363,6 +379,30 @@ recipe = "fog.toml"
         ["[camera]\neye = [0, 0, 1]\ntarget = [0, 0, 0]\nup = [0, 0, 9]", "[0, 0, 9]", "line of sight"],
         ["[camera]\neye = [0, 0, 1]\ntarget = [0, 0, 0]\nfov = 180", "180", "between 0 and 180"],
         ["[camera]\neye = [0, 0, 1]\ntarget = [0, 0, 0]\nnear = 0", "0", "greater than 0"],
+        ["[shading]\nmodel = 'metal'", "'metal'", "`surface` or `fibre`"],
+        ["[shading]\nambient = [0, -1, 0]", "-1", "at least 0"],
+        ["[shading]\nspecular = -0.5", "-0.5", "at least 0"],
+        ["[shading]\nshininess = 0.5", "0.5", "from 1 to 1000"],
+        ["[shading]\nshine = 2", "shine", "unknown key `shine`"],
+        ["[shading]\ntangents = 'x.ktx2'", "'x.ktx2'", "for the model \"fibre\""],
+        ["[shading]\nmodel = 'fibre'\nnormals = 'x.ktx2'", "'x.ktx2'", "for the model \"surface\""],
+        ["[shading]\nambient = [0, 0, 2e6]", "[shading]", "at most 1e6"],
+        ["[[light]]\ndirection = [0, -1, 0]", "[[light]]", "needs a section [shading]"],
+        ["[shading]\n[[light]]", "[[light]]", "either `direction`, or `position`"],
+        ["[shading]\n[[light]]\ndirection = [0, 0, 0]", "[0, 0, 0]", "not be zero"],
+        ["[shading]\n[[light]]\nposition = [0, 9, 0]\nfalloff = 0", "0", "greater than 0"],
+        [
+            "[shading]\n[[light]]\nposition = [0, 9, 0]\ndirection = [1, 0, 0]",
+            "[[light]]",
+            "either `direction`",
+        ],
+        ["[shading]\n[[light]]\ndirection = [0, 9, 0]\nfalloff = 1", "[[light]]", "without `falloff`"],
+        ["[shading]\n[[light]]\ndirection = [0, 9, 0]\ncolor = 'white'", "color", "unknown key `color`"],
+        [
+            "[camera]\neye = [0, 0, 5]\ntarget = [0, 0, 0]\nnear = 0.5\n[shading]\n[[light]]\nposition = [0, 0.1, 5]",
+            "[[light]]",
+            "inside the camera",
+        ],
     ];
 
     #[test]
@@ -377,6 +417,77 @@ recipe = "fog.toml"
             assert_eq!(&source_code.inner()[span.offset()..span.offset() + span.len()], *spot, "{text}");
             assert!(!label.is_empty());
         }
+    }
+
+    #[test]
+    fn lights_are_read() {
+        let lit = "[shading]\nmodel = \"fibre\"\n[[light]]\ndirection = [0, -1e20, 0]\n[[light]]\nposition = [1, 2, 3]\n\
+                   colour = [1, 0, 4]\nfalloff = 0.5\n";
+        let folder = folder();
+        let Loaded { scene, .. } = parse("scene.toml", &format!("{SCENE}{lit}"), folder.path()).unwrap();
+        let shading = scene.shading.unwrap();
+        assert_eq!(shading.model, Model::Fibre);
+        assert_eq!((shading.diffuse, shading.specular, shading.shininess), (1.0, 0.2, 32.0));
+        let position = DVec3::new(1.0, 2.0, 3.0);
+        let expected = [
+            Light { source: Source::Directional { towards: DVec3::Y }, colour: DVec3::ONE },
+            Light {
+                source: Source::Point { position, falloff: Some(0.5) },
+                colour: DVec3::new(1.0, 0.0, 4.0),
+            },
+        ];
+        assert_eq!(shading.lights, expected);
+        let sizes = shading.directions.levels.iter().map(|level| level.size);
+        assert!(sizes.eq(scene.volume.levels.iter().map(|level| level.size)));
+        let light = "[[light]]\ndirection = [0, -1, 0]\n";
+        let text = format!("{SCENE}[shading]\n{}", light.repeat(65));
+        let error = parse("scene.toml", &text, folder.path()).map(drop).unwrap_err();
+        assert!(error.to_string().contains("65 lights, expected at most 64"), "{error}");
+        assert!(parse("scene.toml", &text.replacen(light, "", 1), folder.path()).is_ok());
+        assert!(parse("scene.toml", SCENE, folder.path()).unwrap().scene.shading.is_none());
+    }
+
+    #[test]
+    fn stored_normals_take_the_place_of_derived_ones() {
+        let folder = folder();
+        let lit = format!("{SCENE}[shading]\n");
+        let directions = |text: &str| {
+            parse("scene.toml", text, folder.path()).unwrap().scene.shading.unwrap().directions.levels
+        };
+        let derived = directions(&lit);
+        let unweighted = derived[0].texels.iter().flat_map(|[x, y, z, w]| [x / w, y / w, z / w]);
+        let raw = RawVolume {
+            path: PathBuf::new(),
+            format: String::new(),
+            size: [4; 3],
+            channels: 3,
+            values: unweighted.map(|x| if x.is_finite() { -2.0 * x } else { 0.0 }).collect(),
+            full_scale: 1.0,
+            alpha_mode: AlphaMode::Straight,
+        };
+        volume::write_raw(&folder.path().join("n.ktx2"), &raw, Sample::Float32).unwrap();
+        let stored = directions(&format!("{lit}normals = 'n.ktx2'"));
+        // Turned about, so that it is known who they are; rounded to f32 once more.
+        for (stored, derived) in stored.iter().zip(&derived) {
+            for ([a, b, c, d], [x, y, z, w]) in stored.texels.iter().zip(&derived.texels) {
+                let apart = [a + x, b + y, c + z, d - w];
+                assert!(apart.iter().all(|apart| apart.abs() < 1e-6), "{apart:?}");
+            }
+        }
+        assert!(derived[0].texels.iter().any(|texel| texel[3] > 0.1));
+    }
+
+    #[test]
+    fn stored_normals_must_fit_the_volume() {
+        let folder = folder();
+        let volume = Volume::new([4, 4, 2], vec![[0.5; 4]; 32]).unwrap();
+        volume::write_volume(&folder.path().join("n.ktx2"), &volume).unwrap();
+        let text = format!("{SCENE}[shading]\nnormals = 'n.ktx2'");
+        let error = parse("scene.toml", &text, folder.path()).map(drop).unwrap_err();
+        assert_eq!(error.exit_code(), 3);
+        let message = error.to_string();
+        assert!(message.contains("n.ktx2: holds 4 x 4 x 2 directions"), "{message}");
+        assert!(message.contains("the volume has 4 x 4 x 4 texels"), "{message}");
     }
 
     #[test]
@@ -472,6 +583,11 @@ recipe = "fog.toml"
         let transfer = blocks.next().unwrap();
         let scene = SCENE.replace("recipe", "file") + transfer;
         Text::new("docs", scene, &[]).unwrap().parse::<SceneFile>(("mesh", "generator")).unwrap();
+        let lit = blocks.find(|block| block.contains("[shading]")).unwrap();
+        Text::new("docs", format!("{SCENE}{lit}"), &[])
+            .unwrap()
+            .parse::<SceneFile>(("mesh", "generator"))
+            .unwrap();
     }
 
     /// The keys of a section as the reader lists them when it meets an unknown one.
@@ -485,7 +601,7 @@ recipe = "fog.toml"
     #[test]
     fn every_key_is_documented() {
         let mut found = 0;
-        for section in ["shell", "volume", "camera", "image", "march"] {
+        for section in ["shell", "volume", "camera", "image", "march", "shading"] {
             let (_, documented) = DOCUMENTATION.split_once(&format!("\n## `[{section}]`")).unwrap();
             let documented = documented.split("\n## ").next().unwrap();
             for key in keys(section) {
@@ -493,7 +609,14 @@ recipe = "fog.toml"
                 found += 1;
             }
         }
-        assert_eq!(found, 4 + 8 + 5 + 2 + 3);
+        assert_eq!(found, 4 + 8 + 5 + 2 + 3 + 7);
+        let text = Text::new("keys", format!("{SCENE}[[light]]\nunknown_key = 1"), &[]).unwrap();
+        let message = text.parse::<SceneFile>(("mesh", "generator")).unwrap_err().to_string();
+        let (_, documented) = DOCUMENTATION.split_once("\n## `[[light]]`").unwrap();
+        let keys: Vec<&str> =
+            message.split_once(", expected ").unwrap().1.split('`').skip(1).step_by(2).collect();
+        assert_eq!(keys.len(), 4);
+        assert!(keys.iter().all(|key| documented.contains(&format!("\n| `{key}` |"))), "{keys:?}");
         for generator in ["plane", "tube", "sphere", "torus", "vase", "teapot"] {
             let scene = format!("[mesh]\ngenerator = \"{generator}\"\nunknown_key = 1");
             let text = Text::new("keys", scene, &[]).unwrap();

@@ -19,12 +19,15 @@
 
 pub mod camera;
 pub mod file;
+mod lighting;
 pub mod load;
+pub mod shading;
 pub mod span;
 pub(crate) mod text;
 
 pub use camera::{Camera, View};
 pub use load::{Loaded, load, load_if, parse};
+pub use shading::{Light, Model, Shading, Source};
 
 use std::fmt;
 
@@ -43,6 +46,8 @@ pub struct Scene {
     pub volume: Pyramid,
     /// How opacity and detail are to be read.
     pub medium: Medium,
+    /// How light makes its colours; without it they are what it sends out.
+    pub shading: Option<Shading>,
     /// Where it is seen from, how large, and whether depth is wanted.
     pub view: View,
     /// How finely the `shell` method marches.
@@ -155,6 +160,7 @@ impl Scene {
             shell,
             volume,
             medium: Medium { opacity_distance, lod_footprint: PIXEL_FOOTPRINT },
+            shading: None,
             view: View { camera, width: 512, height: 512, depth: false },
             march: March::default(),
         }

@@ -14,16 +14,18 @@
 //!
 //! The scheme is section 3 of Dufort, Leblanc, Poulin, "Interactive rendering of meso-structure surface
 //! details using semi-transparent 3D textures", VMV 2005. `topology` splits and connects, `extrude`
-//! places the outer vertices, `cell` computes the maps, `health` counts what is wrong.
+//! places the outer vertices, `cell` computes the maps, `frames` smooths them, `health` counts what is wrong.
 
 mod build;
 mod cell;
 mod extrude;
+mod frames;
 mod health;
 mod topology;
 
 use std::sync::Arc;
 
+pub use frames::{FrameKind, Frames};
 use glam::{DAffine3, DMat3, DVec2, DVec3, DVec4};
 
 /// In [`Topology::neighbours`]: no tetrahedron lies beyond that face.

@@ -86,6 +86,10 @@ number! {
     Step = "a number from 0.001 to 1000", |value| (0.001..=1000.0).contains(&value)
 }
 number! {
+    /// The exponent of a highlight: beyond, it is narrower than three degrees.
+    Shininess = "a number from 1 to 1000", |value| (1.0..=1000.0).contains(&value)
+}
+number! {
     /// From 0 to 1, both included.
     Fraction = "a number from 0 to 1", |value| (0.0..=1.0).contains(&value)
 }

@@ -8,6 +8,7 @@ use std::io::{Read as _, Seek as _, SeekFrom, Take, Write as _};
 use std::path::Path;
 
 use flate2::read::ZlibDecoder;
+use glam::DVec3;
 use ktx2::dfd::{Basic, Block};
 use ktx2::{Header, Index, LevelIndex, SupercompressionScheme};
 
@@ -18,6 +19,29 @@ use crate::{Error, Result, output};
 
 /// Reads level 0 of the 3D texture at `path`.
 pub(super) fn read(path: &Path) -> Result<RawVolume> {
+    read_with_type(path).map(|(raw, _)| raw)
+}
+
+/// Reads the first three channels of level 0 as vectors: UNORM as `2 x - 1`, SFLOAT as it is.
+pub(super) fn read_vectors(path: &Path) -> Result<([u32; 3], Vec<DVec3>)> {
+    let (RawVolume { size, channels, values, format, .. }, sample) = read_with_type(path)?;
+    let decode = match sample {
+        Sample::Unorm8 | Sample::Unorm16 => |value: f64| 2.0 * value - 1.0,
+        Sample::Float16 | Sample::Float32 => |value: f64| value,
+        Sample::Srgb8 => {
+            let message = format!("holds colours ({format}), not directions");
+            return Err(Error::input(path, message).with_help("store them as UNORM or SFLOAT"));
+        }
+    };
+    if channels < 3 {
+        let message = format!("holds {channels} channels, but directions have three");
+        return Err(Error::input(path, message).with_help("store x, y and z in red, green and blue"));
+    }
+    let vector = |texel: &[f32]| DVec3::from_array([0, 1, 2].map(|axis| decode(f64::from(texel[axis]))));
+    Ok((size, values.chunks_exact(channels as usize).map(vector).collect()))
+}
+
+fn read_with_type(path: &Path) -> Result<(RawVolume, Sample)> {
     let mut file = Pieces::of(path)?;
     let header =
         Header::from_bytes(&file.bytes(0)?).map_err(|error| Error::input(path, format!("has {error}")))?;
@@ -76,7 +100,8 @@ pub(super) fn read(path: &Path) -> Result<RawVolume> {
     } else {
         AlphaMode::Straight
     };
-    RawVolume { path: path.into(), format, size, channels, values, full_scale: 1.0, alpha_mode }.validated()
+    let raw = RawVolume { path: path.into(), format, size, channels, values, full_scale: 1.0, alpha_mode };
+    Ok((raw.validated()?, sample))
 }
 
 /// A file of which no more is read than is asked for, and that only once it is known to be there.

@@ -1,6 +1,7 @@
 //! Volumes: RGBA 3D textures, their files, recipes and mip pyramids.
 
 mod contact;
+mod directions;
 mod file;
 mod interpretation;
 mod ktx2_file;
@@ -15,6 +16,7 @@ mod transfer;
 pub mod voxelize;
 
 pub use contact::contact_sheet;
+pub use directions::{DirectionLevel, Directions};
 pub use file::{info, is_recipe, read, read_or_make};
 pub use interpretation::Interpretation;
 pub use ktx2_file::{write_raw, write_volume};

@@ -8,6 +8,7 @@
 //! (`left.rs`).
 
 mod left;
+pub mod lit;
 pub mod outline;
 pub mod seen;
 
@@ -15,13 +16,14 @@ use std::sync::Arc;
 
 use bytemuck::{Pod, Zeroable};
 
+use self::lit::{Lit, LitView};
 use self::seen::{Run, Seen};
 use super::{Method, Setup};
 use crate::frame::{Frame, Image, Report, Stopwatch};
 use crate::gpu::{Batch, Buffer, Draw, Gpu, Pipeline, PipelineInfo, Target, Texture3d, draw, shaders};
 use crate::order::{Sorted, Sorter};
 use crate::progress::{Interrupt, Progress};
-use crate::scene::{March, Scene, Sizes, View, span};
+use crate::scene::{March, Model, Scene, Sizes, View, span};
 use crate::volume::Quantity;
 use crate::{Error, Result};
 
@@ -49,6 +51,8 @@ struct Shell {
     interrupt: Interrupt,
     sorter: Sorter,
     volume: Texture3d,
+    /// In a lit scene.
+    lit: Option<Lit>,
     /// The most that a ray passes in one tetrahedron.
     texels: f64,
     // What a frame of one size and kind needs, kept for the next frame.
@@ -65,9 +69,20 @@ struct Canvas {
     cells: Buffer,
     tiles: Buffer,
     members: Buffer,
+    /// In a lit scene.
+    lit: Option<LitView>,
 }
 
 impl Canvas {
+    /// At the bindings that the shaders name.
+    fn buffers<'a>(&'a self, lit: Option<&'a Lit>) -> Vec<&'a Buffer> {
+        let mut buffers = vec![&self.cells, &self.tiles, &self.members];
+        if let (Some(lit), Some(view)) = (lit, &self.lit) {
+            buffers.extend([&view.cells, &lit.frames, &view.lighting]);
+        }
+        buffers
+    }
+
     fn batch(&self, run: &Run) -> Batch<'_> {
         let (pipeline, quads) = match run {
             Run::Sorted(cells) => (&self.sorted, cells),
@@ -119,8 +134,9 @@ impl super::Opened for Opened {
         let texels = span::longest(&scene.shell, size);
         progress.stage("uploading the volume");
         let volume = Texture3d::upload(&gpu, "the volume", &scene.volume)?;
+        let lit = scene.shading.as_ref().map(|shading| Lit::new(&gpu, &scene.shell, shading)).transpose()?;
         let sorter = Sorter::new(&scene.shell.topology);
-        Ok(Box::new(Shell { scene, gpu, progress, interrupt, sorter, volume, texels, canvas: None }))
+        Ok(Box::new(Shell { scene, gpu, progress, interrupt, sorter, volume, lit, texels, canvas: None }))
     }
 }
 
@@ -148,17 +164,19 @@ impl Method for Shell {
             cycles: !seen.tiles.is_empty(),
         };
         let kept = self.canvas.take();
-        let canvas = self.canvas(kept, kind, &seen)?;
+        let canvas = self.canvas(kept, kind, &seen, view)?;
         let canvas = &*self.canvas.insert(canvas);
         watch.lap("upload");
 
         self.interrupt.check()?;
         self.progress.stage("marching");
+        let textures: Vec<&Texture3d> =
+            [&self.volume].into_iter().chain(self.lit.as_ref().map(|lit| &lit.directions)).collect();
         let batches: Vec<Batch<'_>> = seen.runs.iter().map(|run| canvas.batch(run)).collect();
         let times = draw(&Draw {
             target: &canvas.target,
-            buffers: &[&canvas.cells, &canvas.tiles, &canvas.members],
-            textures: &[&self.volume],
+            buffers: &canvas.buffers(self.lit.as_ref()),
+            textures: &textures,
             push_constants: bytemuck::bytes_of(&constants(&self.scene, view, seen.unit)),
             batches: &batches,
             between: &|done| {
@@ -199,45 +217,62 @@ impl Method for Shell {
 
 impl Shell {
     /// The canvas for this frame, with what was seen in its buffers: the one of the frame before, where it is of that kind.
-    fn canvas(&self, kept: Option<Canvas>, kind: CanvasKind, seen: &Seen) -> Result<Canvas> {
+    fn canvas(&self, kept: Option<Canvas>, kind: CanvasKind, seen: &Seen, view: &View) -> Result<Canvas> {
         let Some(mut canvas) = kept.filter(|canvas| canvas.kind == kind) else {
-            return self.new_canvas(kind, seen);
+            return self.new_canvas(kind, seen, view);
         };
         canvas.cells.refill(&seen.cells)?;
         canvas.tiles.refill(&seen.tiles)?;
         canvas.members.refill(&seen.members)?;
+        if let (Some(lit), Some(kept), Some(shading)) = (&self.lit, &mut canvas.lit, &self.scene.shading) {
+            kept.refill(lit, shading, &self.scene.shell, seen, view)?;
+        }
         Ok(canvas)
     }
 
-    fn new_canvas(&self, kind: CanvasKind, seen: &Seen) -> Result<Canvas> {
+    fn new_canvas(&self, kind: CanvasKind, seen: &Seen, view: &View) -> Result<Canvas> {
         let target = Target::new(&self.gpu, kind.width, kind.height, if kind.depth { 2 } else { 1 })?;
-        let constants = [
+        let mut constants = vec![
             plan(self.scene.march),
             u32::from(kind.minified),
             u32::from(self.scene.volume.levels[0].quantity == Quantity::Extinction),
         ];
+        let shading = self.scene.shading.as_ref();
+        constants.extend(shading.map(|shading| u32::from(shading.model == Model::Fibre)));
+        let is_lit = shading.is_some();
         let pipeline = |vertex, fragment| {
             let info = PipelineInfo {
                 vertex,
                 fragment,
                 constants: &constants,
-                storage_buffers: 3,
-                textures: 1,
+                storage_buffers: if is_lit { 6 } else { 3 },
+                textures: if is_lit { 2 } else { 1 },
                 push_constant_bytes: size_of::<ViewConstants>() as u32,
             };
             Pipeline::new(&self.gpu, &target, &info)
         };
-        let [sorted, cycle] = match kind.depth {
-            true => [shaders::SHELL_DEPTH_FRAG, shaders::CYCLE_DEPTH_FRAG],
-            false => [shaders::SHELL_FRAG, shaders::CYCLE_FRAG],
+        let [outline, sorted, cycle] = match (is_lit, kind.depth) {
+            (false, false) => [shaders::SHELL_VERT, shaders::SHELL_FRAG, shaders::CYCLE_FRAG],
+            (false, true) => [shaders::SHELL_VERT, shaders::SHELL_DEPTH_FRAG, shaders::CYCLE_DEPTH_FRAG],
+            (true, false) => [shaders::SHELL_LIT_VERT, shaders::SHELL_LIT_FRAG, shaders::CYCLE_LIT_FRAG],
+            (true, true) => {
+                [shaders::SHELL_LIT_VERT, shaders::SHELL_LIT_DEPTH_FRAG, shaders::CYCLE_LIT_DEPTH_FRAG]
+            }
+        };
+        let lit = match (&self.lit, shading) {
+            (Some(lit), Some(shading)) => {
+                Some(LitView::new(&self.gpu, lit, shading, &self.scene.shell, seen, view)?)
+            }
+            _ => None,
         };
         Ok(Canvas {
             kind,
-            sorted: pipeline(shaders::SHELL_VERT, sorted)?,
+            sorted: pipeline(outline, sorted)?,
             cycle: kind.cycles.then(|| pipeline(shaders::CYCLE_VERT, cycle)).transpose()?,
             cells: Buffer::storage(&self.gpu, "the tetrahedra in order", &seen.cells)?,
             tiles: Buffer::storage(&self.gpu, "the tiles of cycles", &seen.tiles)?,
             members: Buffer::storage(&self.gpu, "the members of cycles", &seen.members)?,
+            lit,
             target,
         })
     }

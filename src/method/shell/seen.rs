@@ -38,6 +38,7 @@ const TILE: u32 = 16;
 
 /// A cell as it is seen.
 struct Mapped {
+    tetrahedron: u32,
     cell: Cell,
     /// The least depth of a vertex, in world units.
     nearest: f64,
@@ -62,6 +63,8 @@ pub enum Run {
 pub struct Seen {
     /// Front to back.
     pub cells: Vec<Cell>,
+    /// That of each cell, in the shell.
+    pub tetrahedra: Vec<u32>,
     /// Where cells meet that have no order of their own.
     pub tiles: Vec<Tile>,
     /// Cells, by tile.
@@ -178,6 +181,7 @@ impl Seen {
                 Ok(mapped) => {
                     self.minified |= mapped.minified;
                     self.cells.push(mapped.cell);
+                    self.tetrahedra.push(mapped.tetrahedron);
                 }
                 Err(Unseen::BeforeNear) => self.before_near += 1,
                 Err(Unseen::Beside) => self.beside += 1,
@@ -247,6 +251,6 @@ impl<'a> Eye<'a> {
         let texels_per_unit =
             (0..3).map(|i| f64::from(size[i]) * texture_from_view.row(i).length()).fold(0.0, f64::max);
         let footprint = self.scene.medium.lod_footprint * self.projection.pixel * farthest;
-        Ok(Mapped { cell, nearest, minified: footprint * texels_per_unit > 1.0 })
+        Ok(Mapped { tetrahedron: t as u32, cell, nearest, minified: footprint * texels_per_unit > 1.0 })
     }
 }

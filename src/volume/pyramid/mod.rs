@@ -6,7 +6,7 @@
 //! `1 - T^(1 / t)`. Filters differ in how they get at `T` and at the light: see [`Filter`].
 
 mod column;
-mod coverage;
+pub(super) mod coverage;
 mod directional;
 mod extinction;
 mod geometry;

@@ -1,0 +1,86 @@
+// The colour of a point in a lit scene: src/scene/shading.rs defines it.
+
+#include "frame.glsl"
+
+layout(constant_id = 3) const bool FIBRE = false; // directions are tangents; else normals
+
+layout(set = 0, binding = 7) uniform sampler3D directions; // times their weight, which is the fourth
+
+struct LightSource {
+    vec4 place;  // towards it, or where it is; 1 / falloff, 0 where there is none
+    vec4 colour; // the fourth: 0 directional, 1 a point
+};
+
+layout(set = 0, binding = 5, std430) readonly buffer Lighting {
+    vec4 world_from_view[3]; // columns
+    vec3 ambient;
+    float diffuse;
+    float specular;
+    float shininess;
+    uint count;
+    LightSource sources[];
+} lighting;
+
+// The light that reaches a point, and the unit vector towards it. What stands between the two would be asked here.
+vec3 arriving(LightSource light, vec3 point, out vec3 to_light) {
+    if (light.colour.w == 0.0) {
+        to_light = light.place.xyz;
+        return light.colour.rgb;
+    }
+    vec3 way = light.place.xyz - point;
+    float distance = length(way);
+    to_light = distance > 0.0 ? way / distance : vec3(0.0);
+    float falls = distance * light.place.w;
+    return light.colour.rgb / (1.0 + falls * falls);
+}
+
+// As `fetch`.
+vec4 fetch_direction(Path path, float depth) {
+    vec3 point = path.at_eye + depth * path.from_depth;
+    if (!MINIFIED) return textureLod(directions, point, 0.0);
+    float level = level_of_detail(path, depth);
+    float fine = floor(level);
+    return mix(textureLod(directions, point, fine), textureLod(directions, point, min(fine + 1.0, view.last_level)),
+               level - fine);
+}
+
+// The texel as it is lit: its alpha, and the colour that it sends to the eye, premultiplied as before.
+vec4 radiant(Path path, float depth) {
+    vec4 texel = fetch(path, depth);
+    if (!(texel.a > LEAST)) return texel;
+    vec4 weighted = fetch_direction(path, depth);
+    vec3 direction = (frame_at_eye + depth * frame_from_depth) * weighted.xyz;
+    float size = length(direction);
+    bool has_direction = weighted.w > LEAST && size > LEAST;
+    direction = has_direction ? direction / size : vec3(0.0);
+    float agreement = has_direction ? min(length(weighted.xyz) / weighted.w, 1.0) : 0.0;
+
+    vec3 ray = lighting.world_from_view[0].xyz * view_ray.x + lighting.world_from_view[1].xyz * view_ray.y
+        + lighting.world_from_view[2].xyz * view_ray.z;
+    vec3 to_eye = -normalize(ray);
+    vec3 scattered = lighting.ambient;
+    vec3 mirrored = vec3(0.0);
+    for (uint i = 0; i < lighting.count; i++) {
+        vec3 to_light;
+        vec3 light = arriving(lighting.sources[i], depth * ray, to_light);
+        float along = dot(direction, to_light);
+        float aligned;
+        float lobe;
+        if (FIBRE) {
+            float along_eye = dot(direction, to_eye);
+            aligned = sqrt(max(1.0 - along * along, 0.0));
+            float off_cone = aligned * sqrt(max(1.0 - along_eye * along_eye, 0.0)) - along * along_eye;
+            lobe = pow(max(off_cone, 0.0), lighting.shininess);
+        } else {
+            vec3 half_way = to_light + to_eye;
+            float half_size = length(half_way);
+            float highlight = half_size > 0.0 ? dot(direction, half_way) / half_size : 0.0;
+            aligned = max(along, 0.0);
+            lobe = aligned * pow(max(highlight, 0.0), lighting.shininess);
+        }
+        float mean = FIBRE ? 0.78539816339744831 : 0.25; // pi / 4: see src/scene/shading.rs
+        scattered += light * (lighting.diffuse * mix(mean, aligned, agreement));
+        mirrored += light * (lighting.specular * agreement * lobe);
+    }
+    return vec4(texel.rgb * scattered + texel.a * mirrored, texel.a);
+}
