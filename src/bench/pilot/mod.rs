@@ -25,7 +25,8 @@ use crate::scene::{March, Scene};
 use crate::{Error, Result};
 
 /// What feeds the shaders.
-const METHOD_CODE: [&str; 3] = [
+const METHOD_CODE: [&str; 4] = [
+    include_str!("../../method/shell/lit.rs"),
     include_str!("../../method/shell/mod.rs"),
     include_str!("../../method/shell/outline.rs"),
     include_str!("../../method/shell/seen.rs"),
@@ -113,7 +114,9 @@ fn fingerprint(scene: &Scene, method: &Entry, setup: &Setup<'_>) -> Result<Finge
     for text in [&of_reference, method.name, &device.name, &device.driver] {
         builder = builder.bytes(text.as_bytes());
     }
-    for shader in [shaders::SHELL_VERT, shaders::SHELL_FRAG, shaders::CYCLE_VERT, shaders::CYCLE_FRAG] {
+    let unlit = [shaders::SHELL_VERT, shaders::SHELL_FRAG, shaders::CYCLE_VERT, shaders::CYCLE_FRAG];
+    let lit = [shaders::SHELL_LIT_VERT, shaders::SHELL_LIT_FRAG, shaders::CYCLE_LIT_FRAG];
+    for shader in unlit.iter().chain(&lit) {
         builder = builder.numbers(shader.words());
     }
     for code in METHOD_CODE {
