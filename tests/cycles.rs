@@ -22,6 +22,10 @@ fn scene(shell: Shell, paints: &[Paint], view: View) -> Arc<Scene> {
     Arc::new(painted(shell, paints, 0.1, view))
 }
 
+/// [`excess`] allows for the ends of one segment on a ray; where a ray goes on from one member into the next, it has the ends of
+/// both. What is behind two of these paints is a tenth of what is before it, or less.
+const TWO_SEGMENTS: f64 = 2.0;
+
 /// Both methods' pictures agree; returns the cycles that the report counts.
 fn agree(scene: &Arc<Scene>) -> u64 {
     let shell = Watched::prepare("shell", scene).render(&scene.view);
@@ -31,7 +35,7 @@ fn agree(scene: &Arc<Scene>) -> u64 {
     let excess = excess(scene, &scene.view, &shell.image);
     println!("{metrics:?}, excess {excess}, {covered} pixels covered, {:?}", shell.report.counts);
     assert!(covered > 500, "only {covered} pixels covered");
-    assert!(excess <= 1.0, "{excess} times what f32 explains, {metrics:?}");
+    assert!(excess <= TWO_SEGMENTS, "{excess} times what f32 explains of a segment, {metrics:?}");
     shell.report.counts["cycles"]
 }
 
