@@ -25,7 +25,7 @@
 //! Modules depend on one another in one direction only: the command line on [`bench`](mod@bench), [`stress`] and [`method`], these on
 //! [`gpu`], and all of them on the modules that know no device. What a shader computes is also computed without one:
 //! [`reference`](mod@reference) evaluates the same integral in f64 on the CPU, and [`metric`] tells how far the two are
-//! apart. `ash` and `unsafe` are in [`gpu`] alone.
+//! apart. `ash`, and all code that the compiler cannot check, is in [`gpu`] alone.
 #![forbid(rustdoc::broken_intra_doc_links)]
 
 pub mod bench;

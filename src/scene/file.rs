@@ -244,3 +244,79 @@ fn pixel_footprint() -> NotNegative {
 fn default_fov() -> FieldOfView {
     FieldOfView(DEFAULT_FOV_DEGREES)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::text::Text;
+
+    const SCENE: &str = r#"
+[mesh]
+generator = "torus"
+segments = 8
+rings = 4
+
+[shell]
+thickness = 0.1
+
+[volume]
+recipe = "fog.toml"
+"#;
+
+    const DOCUMENTATION: &str = include_str!("../../docs/scene.md");
+
+    #[test]
+    fn the_documented_scene_is_one() {
+        let mut blocks =
+            DOCUMENTATION.split("```toml\n").skip(1).map(|block| block.split("```").next().unwrap());
+        let scene = blocks.next().unwrap();
+        Text::new("docs", scene.to_owned(), &[]).unwrap().parse::<SceneFile>(("mesh", "generator")).unwrap();
+        let transfer = blocks.next().unwrap();
+        let scene = SCENE.replace("recipe", "file") + transfer;
+        Text::new("docs", scene, &[]).unwrap().parse::<SceneFile>(("mesh", "generator")).unwrap();
+        let lit = blocks.find(|block| block.contains("[shading]")).unwrap();
+        Text::new("docs", format!("{SCENE}{lit}"), &[])
+            .unwrap()
+            .parse::<SceneFile>(("mesh", "generator"))
+            .unwrap();
+    }
+
+    /// The keys of a section as the reader lists them when it meets an unknown one.
+    fn keys(section: &str) -> Vec<String> {
+        let text = Text::new("keys", SCENE.to_owned(), &[format!("{section}.unknown_key=1")]).unwrap();
+        let message = text.parse::<SceneFile>(("mesh", "generator")).unwrap_err().to_string();
+        let (_, expected) = message.split_once(", expected ").unwrap_or_else(|| panic!("{message}"));
+        expected.split('`').skip(1).step_by(2).map(str::to_owned).collect()
+    }
+
+    #[test]
+    fn every_key_is_documented() {
+        let mut found = 0;
+        for section in ["shell", "volume", "camera", "image", "march", "shading"] {
+            let (_, documented) = DOCUMENTATION.split_once(&format!("\n## `[{section}]`")).unwrap();
+            let documented = documented.split("\n## ").next().unwrap();
+            for key in keys(section) {
+                assert!(documented.contains(&format!("\n| `{key}` |")), "{section}.{key}");
+                found += 1;
+            }
+        }
+        assert_eq!(found, 4 + 8 + 5 + 2 + 3 + 7);
+        let text = Text::new("keys", format!("{SCENE}[[light]]\nunknown_key = 1"), &[]).unwrap();
+        let message = text.parse::<SceneFile>(("mesh", "generator")).unwrap_err().to_string();
+        let (_, documented) = DOCUMENTATION.split_once("\n## `[[light]]`").unwrap();
+        let keys: Vec<&str> =
+            message.split_once(", expected ").unwrap().1.split('`').skip(1).step_by(2).collect();
+        assert_eq!(keys.len(), 4);
+        assert!(keys.iter().all(|key| documented.contains(&format!("\n| `{key}` |"))), "{keys:?}");
+        for generator in ["plane", "tube", "sphere", "torus", "vase", "teapot"] {
+            let scene = format!("[mesh]\ngenerator = \"{generator}\"\nunknown_key = 1");
+            let text = Text::new("keys", scene, &[]).unwrap();
+            let message = text.parse::<SceneFile>(("mesh", "generator")).unwrap_err().to_string();
+            let (_, row) = DOCUMENTATION.split_once(&format!("\n| `{generator}` |")).unwrap();
+            let row = row.lines().next().unwrap();
+            for key in message.split_once(", expected ").unwrap().1.split('`').skip(1).step_by(2) {
+                assert!(row.contains(&format!("`{key}` ")), "{generator}.{key}");
+            }
+        }
+    }
+}

@@ -1,24 +1,20 @@
 //! From the text of a scene file to the [`Scene`] that it describes.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use glam::{DVec2, DVec3};
-use toml::Spanned;
 
 use super::camera::DEFAULT_NEAR;
-use super::file::{CameraSection, DensitySection, MeshSection, Plan, SceneFile, VolumeSection};
+use super::file::{CameraSection, Plan, SceneFile};
 use super::lighting::Lighting;
+use super::source::{MeshSource, VolumeSource};
 use super::text::Text;
 use super::{Camera, March, Medium, Scene, Sizes, View, span, texel_edges};
 use crate::frame::{Stage, Stopwatch};
-use crate::mesh::generate::Generator;
-use crate::mesh::projection::Projection;
-use crate::mesh::{Mesh, obj};
 use crate::progress::{Progress, Silent};
 use crate::shell::{Shell, ShellOptions};
 use crate::value::{Exactly, Finite};
-use crate::volume::recipe::{self, Recipe};
-use crate::volume::{self, Interpretation, Pyramid, Volume};
+use crate::volume::Pyramid;
 use crate::{Error, Result, input};
 
 /// A scene, with what its file says beyond it.
@@ -157,95 +153,6 @@ fn build(
     Ok(Loaded { scene, background, stages: stopwatch.finish() })
 }
 
-/// Where the mesh comes from.
-enum MeshSource<'a> {
-    Generator(&'a Generator),
-    File(&'a Path, Option<&'a Projection>),
-}
-
-impl<'a> MeshSource<'a> {
-    fn of(text: &Text, section: &'a Spanned<MeshSection>) -> Result<Self> {
-        match section.get_ref() {
-            MeshSection { generator: Some(generator), file: None, projection: None } => {
-                generator.check().map_err(|bad| {
-                    let span = text.span_of("mesh", bad.key).unwrap_or(section.span());
-                    text.error(span, format!("`{}` {}", bad.key, bad.message))
-                })?;
-                Ok(Self::Generator(generator))
-            }
-            MeshSection { generator: None, file: Some(file), projection } => {
-                Ok(Self::File(file, projection.as_ref()))
-            }
-            _ => Err(text.error(section.span(), "[mesh] needs either `generator` with its keys or `file`")),
-        }
-    }
-
-    fn load(self, base_dir: &Path) -> Result<Mesh> {
-        match self {
-            Self::Generator(generator) => generator.build(),
-            Self::File(file, projection) => obj::load(base_dir.join(file), projection),
-        }
-    }
-}
-
-/// Where the volume comes from.
-enum VolumeSource {
-    Recipe(Recipe),
-    File(PathBuf, Interpretation),
-}
-
-impl VolumeSource {
-    fn of(text: &Text, section: &Spanned<VolumeSection>, base_dir: &Path) -> Result<Self> {
-        match section.get_ref() {
-            VolumeSection {
-                recipe: Some(path), file: None, transfer: None, density: None, alpha: None, ..
-            } => {
-                Ok(Self::Recipe(recipe::load(base_dir.join(path))?))
-            }
-            VolumeSection { density: Some(_), opacity_distance: Some(_), .. } => Err(text.error(
-                section.span(),
-                "[volume.density] says itself how dense the volume is: leave out `opacity_distance`",
-            )),
-            VolumeSection { recipe: None, file: Some(path), transfer, density, alpha, .. } => {
-                let colour = |density: &DensitySection| {
-                    density.colour.map_or([1.0; 3], |colour| colour.0.to_array())
-                };
-                let interpretation = Interpretation {
-                    density: density.as_ref().map(colour),
-                    alpha_mode: None,
-                    constant_alpha: alpha.map(|alpha| alpha.0 as f32),
-                    transfer: transfer.clone(),
-                };
-                Ok(Self::File(base_dir.join(path), interpretation))
-            }
-            _ => Err(text.error(
-                section.span(),
-                "[volume] needs either `recipe`, or `file` with what it may need of `transfer`, `density` and `alpha`",
-            )),
-        }
-    }
-
-    /// `admit` has been asked about a recipe's size; whether the shell `resolves` it has not.
-    fn load(
-        self,
-        admit: &dyn Fn([u32; 3]) -> Result<()>,
-        resolves: &dyn Fn([u32; 3]) -> Result<()>,
-    ) -> Result<Volume> {
-        match self {
-            Self::Recipe(recipe) => {
-                resolves(recipe.header().size)?;
-                recipe.build()
-            }
-            Self::File(path, interpretation) => {
-                let raw = volume::read(&path)?;
-                admit(raw.size)?;
-                resolves(raw.size)?;
-                Volume::from_raw(raw, &interpretation)
-            }
-        }
-    }
-}
-
 /// The camera, whose axes are checked to exist.
 fn camera(text: &Text, section: &CameraSection) -> Result<Camera> {
     let vector = |v: &Exactly<3, Finite>| DVec3::from_array(v.0.map(|x| x.0));
@@ -269,9 +176,12 @@ fn camera(text: &Text, section: &CameraSection) -> Result<Camera> {
 
 #[cfg(test)]
 mod tests {
+    use std::path::PathBuf;
+
     use super::*;
+    use crate::scene::text::tests::assert_underlined;
     use crate::scene::{Light, Model, Source};
-    use crate::volume::{AlphaMode, RawVolume, Sample};
+    use crate::volume::{self, AlphaMode, RawVolume, Sample, Volume};
 
     const SCENE: &str = r#"
 [mesh]
@@ -412,10 +322,7 @@ recipe = "fog.toml"
         for (text, spot, part) in changes.chain(additions) {
             assert_ne!(text, SCENE, "{part}");
             let error = parse("scene.toml", &text, folder().path()).map(drop).unwrap_err();
-            assert!(error.to_string().contains(part), "{text}: {error}");
-            let Error::Text { source_code, span, label, .. } = error else { panic!("{text}: {error}") };
-            assert_eq!(&source_code.inner()[span.offset()..span.offset() + span.len()], *spot, "{text}");
-            assert!(!label.is_empty());
+            assert_underlined(error, spot, part);
         }
     }
 
@@ -569,63 +476,6 @@ recipe = "fog.toml"
             let error = parse("scene.toml", &scene, folder().path()).map(drop).unwrap_err();
             assert_eq!(error.exit_code(), 3);
             assert!(error.to_string().contains(file), "{error}");
-        }
-    }
-
-    const DOCUMENTATION: &str = include_str!("../../docs/scene.md");
-
-    #[test]
-    fn the_documented_scene_is_one() {
-        let mut blocks =
-            DOCUMENTATION.split("```toml\n").skip(1).map(|block| block.split("```").next().unwrap());
-        let scene = blocks.next().unwrap();
-        Text::new("docs", scene.to_owned(), &[]).unwrap().parse::<SceneFile>(("mesh", "generator")).unwrap();
-        let transfer = blocks.next().unwrap();
-        let scene = SCENE.replace("recipe", "file") + transfer;
-        Text::new("docs", scene, &[]).unwrap().parse::<SceneFile>(("mesh", "generator")).unwrap();
-        let lit = blocks.find(|block| block.contains("[shading]")).unwrap();
-        Text::new("docs", format!("{SCENE}{lit}"), &[])
-            .unwrap()
-            .parse::<SceneFile>(("mesh", "generator"))
-            .unwrap();
-    }
-
-    /// The keys of a section as the reader lists them when it meets an unknown one.
-    fn keys(section: &str) -> Vec<String> {
-        let text = Text::new("keys", SCENE.to_owned(), &[format!("{section}.unknown_key=1")]).unwrap();
-        let message = text.parse::<SceneFile>(("mesh", "generator")).unwrap_err().to_string();
-        let (_, expected) = message.split_once(", expected ").unwrap_or_else(|| panic!("{message}"));
-        expected.split('`').skip(1).step_by(2).map(str::to_owned).collect()
-    }
-
-    #[test]
-    fn every_key_is_documented() {
-        let mut found = 0;
-        for section in ["shell", "volume", "camera", "image", "march", "shading"] {
-            let (_, documented) = DOCUMENTATION.split_once(&format!("\n## `[{section}]`")).unwrap();
-            let documented = documented.split("\n## ").next().unwrap();
-            for key in keys(section) {
-                assert!(documented.contains(&format!("\n| `{key}` |")), "{section}.{key}");
-                found += 1;
-            }
-        }
-        assert_eq!(found, 4 + 8 + 5 + 2 + 3 + 7);
-        let text = Text::new("keys", format!("{SCENE}[[light]]\nunknown_key = 1"), &[]).unwrap();
-        let message = text.parse::<SceneFile>(("mesh", "generator")).unwrap_err().to_string();
-        let (_, documented) = DOCUMENTATION.split_once("\n## `[[light]]`").unwrap();
-        let keys: Vec<&str> =
-            message.split_once(", expected ").unwrap().1.split('`').skip(1).step_by(2).collect();
-        assert_eq!(keys.len(), 4);
-        assert!(keys.iter().all(|key| documented.contains(&format!("\n| `{key}` |"))), "{keys:?}");
-        for generator in ["plane", "tube", "sphere", "torus", "vase", "teapot"] {
-            let scene = format!("[mesh]\ngenerator = \"{generator}\"\nunknown_key = 1");
-            let text = Text::new("keys", scene, &[]).unwrap();
-            let message = text.parse::<SceneFile>(("mesh", "generator")).unwrap_err().to_string();
-            let (_, row) = DOCUMENTATION.split_once(&format!("\n| `{generator}` |")).unwrap();
-            let row = row.lines().next().unwrap();
-            for key in message.split_once(", expected ").unwrap().1.split('`').skip(1).step_by(2) {
-                assert!(row.contains(&format!("`{key}` ")), "{generator}.{key}");
-            }
         }
     }
 }

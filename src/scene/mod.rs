@@ -22,6 +22,7 @@ pub mod file;
 mod lighting;
 pub mod load;
 pub mod shading;
+mod source;
 pub mod span;
 pub(crate) mod text;
 

@@ -189,3 +189,20 @@ fn nest_variant(root: &mut DeTable<'_>, (section, tag): (&str, &str)) {
         table.insert(nested.0, nested.1);
     }
 }
+
+/// For tests of what reads a text.
+#[cfg(test)]
+pub(crate) mod tests {
+    use crate::Error;
+
+    /// The error tells `part` and underlines `spot`, with a label.
+    #[track_caller]
+    pub(crate) fn assert_underlined(error: Error, spot: &str, part: &str) {
+        assert!(error.to_string().contains(part), "{error} does not tell {part}");
+        let Error::Text { source_code, span, label, .. } = error else {
+            panic!("no spot for {part}: {error}")
+        };
+        assert_eq!(&source_code.inner()[span.offset()..span.offset() + span.len()], spot, "{part}");
+        assert!(!label.is_empty(), "{part}");
+    }
+}

@@ -1,0 +1,107 @@
+//! Where a scene's mesh and volume come from: a generator or a recipe, or a file.
+
+use std::path::{Path, PathBuf};
+
+use toml::Spanned;
+
+use super::file::{DensitySection, MeshSection, VolumeSection};
+use super::text::Text;
+use crate::Result;
+use crate::mesh::generate::Generator;
+use crate::mesh::projection::Projection;
+use crate::mesh::{Mesh, obj};
+use crate::volume::recipe::{self, Recipe};
+use crate::volume::{self, Interpretation, Volume};
+
+/// Where the mesh comes from.
+pub(super) enum MeshSource<'a> {
+    Generator(&'a Generator),
+    File(&'a Path, Option<&'a Projection>),
+}
+
+impl<'a> MeshSource<'a> {
+    /// What a section names, if that is one thing.
+    ///
+    /// # Errors
+    /// [`Error::Text`](crate::Error::Text) with the spot.
+    pub(super) fn of(text: &Text, section: &'a Spanned<MeshSection>) -> Result<Self> {
+        match section.get_ref() {
+            MeshSection { generator: Some(generator), file: None, projection: None } => {
+                generator.check().map_err(|bad| {
+                    let span = text.span_of("mesh", bad.key).unwrap_or(section.span());
+                    text.error(span, format!("`{}` {}", bad.key, bad.message))
+                })?;
+                Ok(Self::Generator(generator))
+            }
+            MeshSection { generator: None, file: Some(file), projection } => {
+                Ok(Self::File(file, projection.as_ref()))
+            }
+            _ => Err(text.error(section.span(), "[mesh] needs either `generator` with its keys or `file`")),
+        }
+    }
+
+    pub(super) fn load(self, base_dir: &Path) -> Result<Mesh> {
+        match self {
+            Self::Generator(generator) => generator.build(),
+            Self::File(file, projection) => obj::load(base_dir.join(file), projection),
+        }
+    }
+}
+
+/// Where the volume comes from.
+pub(super) enum VolumeSource {
+    Recipe(Recipe),
+    File(PathBuf, Interpretation),
+}
+
+impl VolumeSource {
+    pub(super) fn of(text: &Text, section: &Spanned<VolumeSection>, base_dir: &Path) -> Result<Self> {
+        match section.get_ref() {
+            VolumeSection {
+                recipe: Some(path), file: None, transfer: None, density: None, alpha: None, ..
+            } => {
+                Ok(Self::Recipe(recipe::load(base_dir.join(path))?))
+            }
+            VolumeSection { density: Some(_), opacity_distance: Some(_), .. } => Err(text.error(
+                section.span(),
+                "[volume.density] says itself how dense the volume is: leave out `opacity_distance`",
+            )),
+            VolumeSection { recipe: None, file: Some(path), transfer, density, alpha, .. } => {
+                let colour = |density: &DensitySection| {
+                    density.colour.map_or([1.0; 3], |colour| colour.0.to_array())
+                };
+                let interpretation = Interpretation {
+                    density: density.as_ref().map(colour),
+                    alpha_mode: None,
+                    constant_alpha: alpha.map(|alpha| alpha.0 as f32),
+                    transfer: transfer.clone(),
+                };
+                Ok(Self::File(base_dir.join(path), interpretation))
+            }
+            _ => Err(text.error(
+                section.span(),
+                "[volume] needs either `recipe`, or `file` with what it may need of `transfer`, `density` and `alpha`",
+            )),
+        }
+    }
+
+    /// `admit` has been asked about a recipe's size; whether the shell `resolves` it has not.
+    pub(super) fn load(
+        self,
+        admit: &dyn Fn([u32; 3]) -> Result<()>,
+        resolves: &dyn Fn([u32; 3]) -> Result<()>,
+    ) -> Result<Volume> {
+        match self {
+            Self::Recipe(recipe) => {
+                resolves(recipe.header().size)?;
+                recipe.build()
+            }
+            Self::File(path, interpretation) => {
+                let raw = volume::read(&path)?;
+                admit(raw.size)?;
+                resolves(raw.size)?;
+                Volume::from_raw(raw, &interpretation)
+            }
+        }
+    }
+}
