@@ -151,49 +151,60 @@ pub fn render(scene: &Scene, view: &View, progress: &dyn Progress, interrupt: &I
     let reference = Reference::new(scene, view);
     stopwatch.lap("hierarchy");
 
-    progress.stage("integrating rays");
-    let rows_done = AtomicU32::new(0);
-    let row = |y: u32| -> Result<(Vec<Sample>, Counts)> {
-        interrupt.check()?;
-        let mut counts = Counts::default();
-        let samples = (0..view.width).map(|x| {
-            let point = DVec2::new(f64::from(x) + 0.5, f64::from(y) + 0.5);
-            let (sample, added) = reference.integrate(view.ray_at_unit_depth(point));
-            counts = counts.add(added);
-            sample
-        });
-        let samples = samples.collect();
-        let done = rows_done.fetch_add(1, Ordering::Relaxed) + 1;
-        progress.fraction(f64::from(done) / f64::from(view.height));
-        Ok((samples, counts))
+    let sample = |x: u32, y: u32, counts: &mut Counts| {
+        let point = DVec2::new(f64::from(x) + 0.5, f64::from(y) + 0.5);
+        let (sample, added) = reference.integrate(view.ray_at_unit_depth(point));
+        *counts = counts.add(added);
+        sample
     };
-    let rows: Vec<_> = (0..view.height).into_par_iter().map(row).collect::<Result<_>>()?;
+    let (samples, counts) = of_all_pixels(view, progress, interrupt, sample)?;
     stopwatch.lap("integrate");
 
-    let samples = || rows.iter().flat_map(|(samples, _)| samples);
-    let image = Image {
-        width: view.width,
-        height: view.height,
-        rgba: samples().map(|sample| sample.rgba.map(|channel| channel as f32)).collect(),
+    let depth = view.depth.then(|| samples.iter().map(|sample| sample.depth as f32).collect());
+    let rgba = samples.iter().map(|sample| sample.rgba.map(|channel| channel as f32)).collect();
+    let image = Image { width: view.width, height: view.height, rgba };
+    let report = report(stopwatch, counts, &image);
+    Ok(Frame { image, depth, report })
+}
+
+/// Evaluates every pixel of a view, row by row from the top left, on all threads of the current rayon pool; `pixel` adds to the
+/// counts what it cost.
+fn of_all_pixels<T: Send>(
+    view: &View,
+    progress: &dyn Progress,
+    interrupt: &Interrupt,
+    pixel: impl Fn(u32, u32, &mut Counts) -> T + Sync,
+) -> Result<(Vec<T>, Counts)> {
+    progress.stage("integrating rays");
+    let rows_done = AtomicU32::new(0);
+    let row = |y: u32| -> Result<(Vec<T>, Counts)> {
+        let mut counts = Counts::default();
+        let evaluate = |x| interrupt.check().map(|()| pixel(x, y, &mut counts));
+        let pixels = (0..view.width).map(evaluate).collect::<Result<_>>()?;
+        let done = rows_done.fetch_add(1, Ordering::Relaxed) + 1;
+        progress.fraction(f64::from(done) / f64::from(view.height));
+        Ok((pixels, counts))
     };
-    let depth = view.depth.then(|| samples().map(|sample| sample.depth as f32).collect());
+    let rows: Vec<_> = (0..view.height).into_par_iter().map(row).collect::<Result<_>>()?;
     let counts = rows.iter().fold(Counts::default(), |sum, (_, counts)| sum.add(*counts));
-    let covered = samples().filter(|sample| sample.rgba[3] > 0.0).count() as u64;
-    let report = Report {
+    Ok((rows.into_iter().flat_map(|(pixels, _)| pixels).collect(), counts))
+}
+
+fn report(stopwatch: Stopwatch, counts: Counts, image: &Image) -> Report {
+    let covered = image.rgba.iter().filter(|pixel| pixel[3] > 0.0).count() as u64;
+    let counts = [
+        ("rays", counts.rays),
+        ("segments", counts.segments),
+        ("panels", counts.panels),
+        ("pixels_covered", covered),
+    ];
+    Report {
         method: "reference".into(),
         device: "cpu".into(),
         stages: stopwatch.finish(),
-        counts: [
-            ("rays", counts.rays),
-            ("segments", counts.segments),
-            ("panels", counts.panels),
-            ("pixels_covered", covered),
-        ]
-        .map(|(name, count)| (name.to_owned(), count))
-        .into(),
+        counts: counts.map(|(name, count)| (name.to_owned(), count)).into(),
         ..Report::default()
-    };
-    Ok(Frame { image, depth, report })
+    }
 }
 
 /// The largest ratio of premultiplied colour to alpha over all texels that have alpha, at least 1, as it may be lit. An

@@ -1,13 +1,10 @@
 //! What filters are measured against: the mean of many rays a pixel through the full volume, which no filter has touched.
 
-use std::sync::atomic::{AtomicU32, Ordering};
-
 use glam::DVec2;
-use rayon::prelude::*;
 
-use super::{Counts, Reference};
+use super::{Counts, Reference, of_all_pixels, report};
 use crate::Result;
-use crate::frame::{Frame, Image, Report, Stopwatch};
+use crate::frame::{Frame, Image, Stopwatch};
 use crate::progress::{Interrupt, Progress};
 use crate::scene::{Scene, View};
 
@@ -30,48 +27,24 @@ pub fn render_supersampled(
     let reference = Reference::new(scene, view).with_lod_footprint(0.0).with_tolerance(tolerance);
     stopwatch.lap("hierarchy");
 
-    progress.stage("integrating rays");
-    let rows_done = AtomicU32::new(0);
     let offsets = (0..side * side).map(|ray| DVec2::new(f64::from(ray % side), f64::from(ray / side)) + 0.5);
     let offsets: Vec<DVec2> = offsets.map(|offset| offset / f64::from(side)).collect();
-    let row = |y: u32| -> Result<(Vec<[f32; 4]>, Counts)> {
-        let mut counts = Counts::default();
-        let mut pixel = |x: u32| -> Result<[f32; 4]> {
-            interrupt.check()?;
-            let corner = DVec2::new(f64::from(x), f64::from(y));
-            let mut sum = [0.0; 4];
-            for &offset in &offsets {
-                let (sample, added) = reference.integrate(view.ray_at_unit_depth(corner + offset));
-                counts = counts.add(added);
-                sum = std::array::from_fn(|channel| sum[channel] + sample.rgba[channel]);
-            }
-            Ok(sum.map(|sum| (sum / offsets.len() as f64) as f32))
-        };
-        let pixels = (0..view.width).map(&mut pixel).collect::<Result<_>>()?;
-        let done = rows_done.fetch_add(1, Ordering::Relaxed) + 1;
-        progress.fraction(f64::from(done) / f64::from(view.height));
-        Ok((pixels, counts))
+    let pixel = |x: u32, y: u32, counts: &mut Counts| {
+        let corner = DVec2::new(f64::from(x), f64::from(y));
+        let mut sum = [0.0; 4];
+        for &offset in &offsets {
+            let (sample, added) = reference.integrate(view.ray_at_unit_depth(corner + offset));
+            *counts = counts.add(added);
+            sum = std::array::from_fn(|channel| sum[channel] + sample.rgba[channel]);
+        }
+        sum.map(|sum| (sum / offsets.len() as f64) as f32)
     };
-    let rows: Vec<_> = (0..view.height).into_par_iter().map(row).collect::<Result<_>>()?;
+    let (rgba, counts) = of_all_pixels(view, progress, interrupt, pixel)?;
     stopwatch.lap("integrate");
 
-    let counts = rows.iter().fold(Counts::default(), |sum, (_, counts)| sum.add(*counts));
-    let rgba: Vec<[f32; 4]> = rows.into_iter().flat_map(|(pixels, _)| pixels).collect();
-    let covered = rgba.iter().filter(|pixel| pixel[3] > 0.0).count() as u64;
-    let counts = [
-        ("rays", counts.rays),
-        ("segments", counts.segments),
-        ("panels", counts.panels),
-        ("pixels_covered", covered),
-    ];
-    let report = Report {
-        method: "reference".into(),
-        device: "cpu".into(),
-        stages: stopwatch.finish(),
-        counts: counts.map(|(name, count)| (name.to_owned(), count)).into(),
-        ..Report::default()
-    };
-    Ok(Frame { image: Image { width: view.width, height: view.height, rgba }, depth: None, report })
+    let image = Image { width: view.width, height: view.height, rgba };
+    let report = report(stopwatch, counts, &image);
+    Ok(Frame { image, depth: None, report })
 }
 
 #[cfg(test)]
