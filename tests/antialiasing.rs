@@ -1,10 +1,13 @@
 //! Filters against many rays a pixel, from the sweep file to the report.
 
+mod common;
+
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
 
+use common::keys;
 use serde_json::Value;
 use tempfile::TempDir;
 
@@ -38,20 +41,6 @@ fn bench(desk: &TempDir, arguments: &[&str]) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_mesoshell"));
     command.arg("bench").args(arguments).current_dir(desk.path()).env("NO_COLOR", "1").stdin(Stdio::null());
     command.output().unwrap()
-}
-
-/// The keys of all objects in a JSON value.
-fn keys(value: &Value, found: &mut BTreeSet<String>) {
-    match value {
-        Value::Object(fields) => {
-            for (key, value) in fields {
-                found.insert(key.clone());
-                keys(value, found);
-            }
-        }
-        Value::Array(items) => items.iter().for_each(|item| keys(item, found)),
-        _ => {}
-    }
 }
 
 #[test]

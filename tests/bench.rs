@@ -1,11 +1,14 @@
 //! Benchmarks from sweep to report: what is written, what is reused, and how an interrupted one goes on.
 
+mod common;
+
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
 use std::sync::Arc;
 
+use common::keys;
 use mesoshell::bench::{self, Options, Outcome, Results, Sweep};
 use mesoshell::gpu::DeviceChoice;
 use mesoshell::method::Setup;
@@ -88,20 +91,6 @@ fn times(results: &Results) -> Vec<Vec<Vec<f64>>> {
     let points =
         |scene: &bench::SceneResults| scene.points.iter().map(|point| point.time.runs.clone()).collect();
     results.scenes.iter().map(points).collect()
-}
-
-/// Every key of a JSON value, lists and the names of stages and errors looked through.
-fn keys(value: &Value, found: &mut BTreeSet<String>) {
-    match value {
-        Value::Object(fields) => {
-            for (key, value) in fields {
-                found.insert(key.clone());
-                keys(value, found);
-            }
-        }
-        Value::Array(items) => items.iter().for_each(|item| keys(item, found)),
-        _ => {}
-    }
 }
 
 #[test]

@@ -8,7 +8,7 @@ use super::measure::{Subject, measure};
 use super::remaining::Remaining;
 use super::report::{csv, html};
 use super::results::{Results, SceneResults};
-use super::sweep::Sweep;
+use super::sweep::{Sweep, overrides};
 use crate::gpu::Gpu;
 use crate::method::{Entry, METHODS, Opened, Setup};
 use crate::progress::Silent;
@@ -52,8 +52,7 @@ pub fn run(sweep: &Sweep, options: &Options<'_>, setup: &Setup<'_>) -> Result<Ou
         true => resumed(&json, &fresh)?,
         false => fresh,
     };
-    let size = sweep.size.map(|[width, height]| format!("image.size=[{width}, {height}]"));
-    let overrides: Vec<String> = size.into_iter().chain(sweep.define.iter().cloned()).collect();
+    let overrides = overrides(sweep.size, &sweep.define);
     // What keeps a scene from being drawn, or results from being written, is told before anything is measured.
     let opened = opened(sweep, setup)?;
     for path in &sweep.scenes {

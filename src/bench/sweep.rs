@@ -233,6 +233,12 @@ fn looks_like_sweep(text: &str) -> bool {
         .is_ok_and(|table| ["scenes", "plans"].iter().any(|&key| table.get_ref().get(key).is_some()))
 }
 
+/// What is laid over every scene of a sweep: its size, then its own values.
+pub(super) fn overrides(size: Option<[u32; 2]>, define: &[String]) -> Vec<String> {
+    let size = size.map(|[width, height]| format!("image.size=[{width}, {height}]"));
+    size.into_iter().chain(define.iter().cloned()).collect()
+}
+
 /// Every method at every level, plan by plan.
 fn settings(methods: &[&str], levels: &Levels) -> Vec<Setting> {
     let steps = levels.steps.iter().map(|&step| March::Default { step });
@@ -258,6 +264,7 @@ fn measurable(name: &str) -> Result<(), String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene::text::tests::assert_underlined;
 
     const SWEEP: &str = "\
 scenes = ['a.toml', '../b.toml']
@@ -324,10 +331,7 @@ exact = true
         for [from, to, spot, part] in MISTAKES {
             let text = SWEEP.replacen(from, to, 1);
             assert_ne!(text, SWEEP, "{from}");
-            let error = parse(&text).unwrap_err();
-            assert!(error.to_string().contains(part), "{to}: {error}");
-            let Error::Text { source_code, span, .. } = error else { panic!("{to}: {error}") };
-            assert_eq!(&source_code.inner()[span.offset()..span.offset() + span.len()], *spot, "{to}");
+            assert_underlined(parse(&text).unwrap_err(), spot, part);
         }
     }
 

@@ -179,6 +179,15 @@ mod tests {
     use super::*;
 
     #[test]
+    fn colour_without_opacity_is_dropped() {
+        let texels = vec![[0.5, 0.0, 2.0, 0.0], [0.5, 0.0, 2.0, 1e-30]];
+        for quantity in [Quantity::Opacity, Quantity::Extinction] {
+            let volume = Volume::of(quantity, [2, 1, 1], texels.clone()).unwrap();
+            assert_eq!(volume.texels, [[0.0; 4], texels[1]]);
+        }
+    }
+
+    #[test]
     fn a_bad_value_is_told_with_its_place() {
         let size = [2, 3, 4];
         let good = vec![[0.5, 0.0, 2.0, 1.0]; 24];

@@ -1,6 +1,7 @@
 //! What the tests that draw share: a watched device. Scenes without a file are in `mesoshell::stress::scenes`.
 #![allow(dead_code, reason = "each test binary uses its own part")]
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use mesoshell::frame::Frame;
@@ -8,6 +9,7 @@ use mesoshell::gpu::{DeviceChoice, Messages};
 use mesoshell::method::{self, Method, Setup};
 use mesoshell::progress::{Interrupt, Progress, Silent};
 use mesoshell::scene::{Scene, View};
+use serde_json::Value;
 
 /// A method under the eyes of the validation layers, synchronization validation included: any message, the device's
 /// end included, fails the test. A test without a Vulkan driver or without the layers fails too, and says what to install.
@@ -50,4 +52,18 @@ pub fn set_up<T>(messages: &Messages, run: impl FnOnce(Setup<'_>) -> T) -> T {
         progress: &progress,
         interrupt: &Interrupt::default(),
     })
+}
+
+/// The keys of all objects in a JSON value.
+pub fn keys(value: &Value, found: &mut BTreeSet<String>) {
+    match value {
+        Value::Object(fields) => {
+            for (key, value) in fields {
+                found.insert(key.clone());
+                keys(value, found);
+            }
+        }
+        Value::Array(items) => items.iter().for_each(|item| keys(item, found)),
+        _ => {}
+    }
 }

@@ -9,6 +9,7 @@ use super::sweep::Sweep;
 use crate::bench::cache::{self, Cached};
 use crate::bench::file::write_whole;
 use crate::bench::fingerprint::Fingerprint;
+use crate::bench::sweep::overrides;
 use crate::bench::{Environment, Options};
 use crate::frame::Image;
 use crate::gpu::Gpu;
@@ -51,8 +52,7 @@ pub struct Pictures {
 /// Whatever stands between a scene and its picture; [`Error::Output`](crate::Error::Output).
 pub fn run(sweep: &Sweep, options: &Options<'_>, setup: &Setup<'_>) -> Result<Outcome> {
     let device = Gpu::open(setup.device, setup.validation)?.info().clone();
-    let size = sweep.size.map(|[width, height]| format!("image.size=[{width}, {height}]"));
-    let overrides: Vec<String> = size.into_iter().chain(sweep.define.iter().cloned()).collect();
+    let overrides = overrides(sweep.size, &sweep.define);
     let mut results = Results {
         schema: results::SCHEMA,
         sweep: sweep.clone(),

@@ -133,7 +133,7 @@ fn span_of_section(text: &str, section: &str) -> Option<std::ops::Range<usize>> 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Error;
+    use crate::scene::text::tests::assert_underlined;
 
     const SWEEP: &str = "\
 scenes = ['a.toml']
@@ -194,10 +194,7 @@ step = 0.25
         for [from, to, spot, part] in MISTAKES {
             let text = SWEEP.replacen(from, to, 1);
             assert_ne!(text, SWEEP, "{from}");
-            let error = parse(&text).unwrap_err();
-            assert!(error.to_string().contains(part), "{to}: {error}");
-            let Error::Text { source_code, span, .. } = error else { panic!("{to}: {error}") };
-            assert_eq!(&source_code.inner()[span.offset()..span.offset() + span.len()], *spot, "{to}");
+            assert_underlined(parse(&text).unwrap_err(), spot, part);
         }
     }
 

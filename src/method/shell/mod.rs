@@ -377,6 +377,16 @@ mod tests {
     use super::*;
 
     #[test]
+    fn plans_have_the_numbers_of_the_shader() {
+        let shader = include_str!("../../../glsl/include/sample.glsl");
+        for (name, march) in
+            [("DEFAULT", March::default()), ("PAPER", March::Paper { samples: 1 }), ("EXACT", March::Exact)]
+        {
+            assert!(shader.contains(&format!("const uint PLAN_{name} = {};", plan(march))), "{name}");
+        }
+    }
+
+    #[test]
     fn host_and_shader_agree_on_the_most_samples() {
         let shader = include_str!("../../../glsl/include/sample.glsl");
         assert!(shader.contains(&format!("clamp(ceil(texels / view.step), 1.0, {MOST_SAMPLES:.1})")));
