@@ -14,7 +14,7 @@ use mesoshell::mesh::Mesh;
 use mesoshell::metric;
 use mesoshell::progress::Silent;
 use mesoshell::reference::Reference;
-use mesoshell::scene::{self, Light, March, Model, Scene, Shading, Source, View};
+use mesoshell::scene::{self, Emission, Light, March, Model, Scene, Shading, Source, View};
 use mesoshell::shell::{Shell, ShellOptions};
 use mesoshell::volume::{Directions, Pyramid, Volume};
 use rayon::prelude::*;
@@ -84,7 +84,9 @@ fn slab(linear: DMat3, alpha: f32, model: Model, direction: DVec3) -> Scene {
         diffuse: DIFFUSE,
         specular: SPECULAR,
         shininess: SHININESS,
-        lights: lights.map(|(source, colour)| Light { source, colour }).to_vec(),
+        emission: Emission { glow: 0.0, from: 0.0 },
+        shadow_size: 64,
+        lights: lights.map(|(source, colour)| Light { source, colour, shadow: false }).to_vec(),
         directions,
     });
     scene
@@ -261,7 +263,8 @@ fn the_highlight_is_at_the_mirror_direction() {
     let to_eye = (scene.view.camera.eye - top).normalize();
     let shading = scene.shading.as_mut().unwrap();
     let towards = DVec3::new(-to_eye.x, -to_eye.y, to_eye.z);
-    shading.lights = vec![Light { source: Source::Directional { towards }, colour: DVec3::ONE }];
+    shading.lights =
+        vec![Light { source: Source::Directional { towards }, colour: DVec3::ONE, shadow: false }];
     (shading.ambient, shading.diffuse, shading.specular, shading.shininess) = (DVec3::ZERO, 0.0, 1.0, 1000.0);
     let image = shell(&scene);
     let brightest =

@@ -7,7 +7,7 @@ use bytemuck::NoUninit;
 use serde::{Deserialize, Serialize};
 
 use crate::reference::TOLERANCE;
-use crate::scene::{Light, Model, Scene, Shading, Source, View};
+use crate::scene::{Light, Model, Scene, Shading, Solid, Source, View};
 use crate::volume::{DirectionLevel, Quantity, Volume};
 
 /// The code that a cached reference comes from: were it changed, so might its pictures be.
@@ -106,6 +106,18 @@ fn seen(mut builder: Builder, scene: &Scene, view: &View, levels: &[Volume]) -> 
         };
         builder = builder.bytes(quantity.as_bytes()).numbers(&level.size).numbers(&level.texels);
     }
+    for Solid { mesh, colour, texture } in &scene.solids {
+        let levels = texture.as_ref().map_or(&[][..], |texture| &texture.levels);
+        builder = builder
+            .numbers(&mesh.positions)
+            .numbers(&mesh.normals)
+            .numbers(&mesh.triangles)
+            .numbers(&mesh.uvs)
+            .numbers(&[*colour]);
+        for level in levels {
+            builder = builder.numbers(&level.size).numbers(&level.texels);
+        }
+    }
     if let Some(shading) = &scene.shading {
         builder = lit(builder, scene, shading, &shading.directions.levels[..levels.len()]);
     }
@@ -114,7 +126,17 @@ fn seen(mut builder: Builder, scene: &Scene, view: &View, levels: &[Volume]) -> 
 
 /// Adds what the light is, and what it falls on.
 fn lit(builder: Builder, scene: &Scene, shading: &Shading, levels: &[DirectionLevel]) -> Builder {
-    let Shading { model, ambient, diffuse, specular, shininess, lights, directions: _ } = shading;
+    let Shading {
+        model,
+        ambient,
+        diffuse,
+        specular,
+        shininess,
+        emission,
+        shadow_size,
+        lights,
+        directions: _,
+    } = shading;
     let model_name = match model {
         Model::Surface => "surface",
         Model::Fibre => "fibre",
@@ -123,17 +145,19 @@ fn lit(builder: Builder, scene: &Scene, shading: &Shading, levels: &[DirectionLe
     let mut builder = builder
         .bytes(model_name.as_bytes())
         .numbers(&[*ambient])
-        .numbers(&[*diffuse, *specular, *shininess])
+        .numbers(&[*diffuse, *specular, *shininess, emission.glow, emission.from])
+        .numbers(&[*shadow_size])
         .numbers(&frames.maps)
         .numbers(&frames.of_vertices);
-    for Light { source, colour } in lights {
+    for Light { source, colour, shadow } in lights {
         builder = match source {
             Source::Directional { towards } => builder.bytes(b"directional").numbers(&[*towards]),
             Source::Point { position, falloff } => {
                 builder.bytes(b"point").numbers(&[*position]).numbers(&[falloff.unwrap_or(f64::INFINITY)])
             }
         }
-        .numbers(&[*colour]);
+        .numbers(&[*colour])
+        .numbers(&[u32::from(*shadow)]);
     }
     for level in levels {
         builder = builder.numbers(&level.size).numbers(&level.texels);
@@ -147,7 +171,7 @@ pub(crate) mod tests {
 
     use super::*;
     use crate::mesh::generate::{Generator, Torus};
-    use crate::scene::March;
+    use crate::scene::{Emission, March};
     use crate::shell::{Shell, ShellOptions};
     use crate::volume::{Directions, Pyramid};
 
@@ -206,7 +230,9 @@ pub(crate) mod tests {
             diffuse: 1.0,
             specular: 0.5,
             shininess: 20.0,
-            lights: [sun, lamp].map(|source| Light { source, colour: DVec3::ONE }).to_vec(),
+            emission: Emission { glow: 0.0, from: 0.0 },
+            shadow_size: 64,
+            lights: [sun, lamp].map(|source| Light { source, colour: DVec3::ONE, shadow: false }).to_vec(),
             directions: Directions::normals(&scene.volume.levels[0]),
         };
         Scene { shading: Some(shading), ..scene }

@@ -1,8 +1,13 @@
 //! A model: a mesh with materials and without normals, as it is voxelised. It need not be fit for a shell.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use glam::{DVec2, DVec3, Vec3};
+use image::ImageReader;
+
+use crate::frame::srgb::linear_from_srgb;
+use crate::volume::{Quantity, Volume};
+use crate::{Error, Result, input};
 
 /// Triangles whose positions are welded, and what they are made of.
 #[derive(Debug, Clone, PartialEq)]
@@ -19,6 +24,13 @@ pub struct Model {
     pub triangle_materials: Vec<u32>,
     /// At least one.
     pub materials: Vec<Material>,
+}
+
+impl Model {
+    /// Whether there are any texture coordinates.
+    pub fn has_uvs(&self) -> bool {
+        self.uvs.iter().flatten().any(|uv| *uv != DVec2::ZERO)
+    }
 }
 
 /// The colour of a surface.
@@ -53,6 +65,37 @@ struct Level {
 }
 
 impl Texture {
+    /// Reads a PNG or JPEG picture in sRGB; its alpha is not read.
+    ///
+    /// # Errors
+    /// [`Error::Input`] where it cannot be read or is damaged.
+    pub fn read(path: &Path) -> Result<Self> {
+        let unreadable = |error: String| {
+            Error::input(path, format!("the texture cannot be read: {error}")).with_help(
+                "textures are PNG or JPEG pictures; their names are relative to the file that names them",
+            )
+        };
+        input::open(path).map_err(|error| unreadable(error.to_string()))?;
+        // The reader's own limits bound the memory that a header may claim.
+        let picture = ImageReader::open(path)
+            .and_then(ImageReader::with_guessed_format)
+            .map_err(|error| unreadable(error.to_string()))?
+            .decode()
+            .map_err(|error| unreadable(error.to_string()))?
+            .into_rgb32f();
+        let (width, height) = picture.dimensions();
+        let pixels = picture.pixels().map(|pixel| Vec3::from(pixel.0.map(linear_from_srgb))).collect();
+        Ok(Self::new(width as usize, height as usize, pixels))
+    }
+
+    /// The full texture as a volume of one texel along w, opaque; its v runs up, as texture coordinates do.
+    pub fn volume(&self) -> Volume {
+        let Level { width, height, pixels } = &self.levels[0];
+        let rows = pixels.chunks(*width).rev();
+        let texels = rows.flatten().map(|pixel| pixel.extend(1.0).to_array()).collect();
+        Volume { size: [*width as u32, *height as u32, 1], texels, quantity: Quantity::Opacity }
+    }
+
     /// A texture of `width * height` linear pixels, row by row from the top, which is v = 1.
     ///
     /// # Panics

@@ -13,11 +13,12 @@ use toml::Spanned;
 use super::Model;
 use super::PIXEL_FOOTPRINT;
 use super::camera::DEFAULT_FOV_DEGREES;
+use super::shading::DEFAULT_SHADOW_SIZE;
 use crate::mesh::generate::Generator;
 use crate::mesh::projection::Projection;
 use crate::value::{
-    Colour, Exactly, FieldOfView, Finite, Fraction, NotNegative, PictureSize, Pixels, Positive, Rounds,
-    Samples, Shininess, Step,
+    BelowOne, Colour, Exactly, FieldOfView, Finite, Fraction, NotNegative, PictureSize, Pixels, Positive,
+    Rounds, Samples, ShadowSize, Shininess, Step,
 };
 use crate::volume::{Filter, TransferFunction};
 
@@ -44,6 +45,40 @@ pub struct SceneFile {
     /// The lights; the spans are those of the sections.
     #[serde(default)]
     pub light: Vec<Spanned<LightSection>>,
+    /// Makes the base mesh opaque.
+    pub base: Option<BaseSection>,
+    /// Opaque meshes; the spans are those of the sections.
+    #[serde(default)]
+    pub solid: Vec<Spanned<SolidSection>>,
+}
+
+/// `[base]`: the base mesh is opaque.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct BaseSection {
+    /// Multiplies the texture; by default white.
+    #[serde(default = "white")]
+    pub colour: Colour,
+    /// A picture laid over the mesh's own texture coordinates, relative to the scene file.
+    pub texture: Option<PathBuf>,
+}
+
+/// `[[solid]]`: an opaque mesh.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SolidSection {
+    /// An OBJ file, relative to the scene file.
+    pub file: PathBuf,
+    /// In place of the file's materials; multiplies the texture.
+    pub colour: Option<Colour>,
+    /// A picture, relative to the scene file, in place of the file's materials.
+    pub texture: Option<PathBuf>,
+    /// World space: where the origin of the file is.
+    #[serde(default = "origin")]
+    pub position: Exactly<3, Finite>,
+    /// World units for one of the file.
+    #[serde(default = "scale_one")]
+    pub scale: Positive,
 }
 
 /// `[mesh]`: a generator or a file.
@@ -162,6 +197,12 @@ pub struct ShadingSection {
     pub specular: NotNegative,
     /// How narrow the highlights are.
     pub shininess: Shininess,
+    /// Factor on the light that bright colours send out of themselves.
+    pub glow: NotNegative,
+    /// How bright a colour must be to glow.
+    pub glow_from: BelowOne,
+    /// Pixels a side of the pictures from which shadows are read.
+    pub shadow_size: ShadowSize,
     /// For a surface: a file of normals, relative to the scene file; by default they are derived.
     pub normals: Option<Spanned<PathBuf>>,
     /// For fibres: a file of tangents, relative to the scene file; by default they are derived.
@@ -181,6 +222,9 @@ pub struct LightSection {
     pub colour: Colour,
     /// With `position`: at which distance, in world units, half of it is left.
     pub falloff: Option<Positive>,
+    /// Whether it casts shadows.
+    #[serde(default)]
+    pub shadow: bool,
 }
 
 /// How samples are spread.
@@ -215,6 +259,9 @@ impl Default for ShadingSection {
             diffuse: NotNegative(1.0),
             specular: NotNegative(0.2),
             shininess: Shininess(32.0),
+            glow: NotNegative(0.0),
+            glow_from: BelowOne(0.0),
+            shadow_size: ShadowSize(DEFAULT_SHADOW_SIZE),
             normals: None,
             tangents: None,
         }
@@ -223,6 +270,14 @@ impl Default for ShadingSection {
 
 fn white() -> Colour {
     Colour::linear(1.0, 1.0, 1.0)
+}
+
+fn origin() -> Exactly<3, Finite> {
+    Exactly([Finite(0.0); 3])
+}
+
+fn scale_one() -> Positive {
+    Positive(1.0)
 }
 
 fn no_rounds() -> Rounds {
@@ -275,10 +330,11 @@ recipe = "fog.toml"
         let scene = SCENE.replace("recipe", "file") + transfer;
         Text::new("docs", scene, &[]).unwrap().parse::<SceneFile>(("mesh", "generator")).unwrap();
         let lit = blocks.find(|block| block.contains("[shading]")).unwrap();
-        Text::new("docs", format!("{SCENE}{lit}"), &[])
-            .unwrap()
-            .parse::<SceneFile>(("mesh", "generator"))
-            .unwrap();
+        let solid = blocks.find(|block| block.contains("[[solid]]")).unwrap();
+        for block in [lit, solid] {
+            let text = Text::new("docs", format!("{SCENE}{block}"), &[]).unwrap();
+            text.parse::<SceneFile>(("mesh", "generator")).unwrap();
+        }
     }
 
     /// The keys of a section as the reader lists them when it meets an unknown one.
@@ -292,7 +348,7 @@ recipe = "fog.toml"
     #[test]
     fn every_key_is_documented() {
         let mut found = 0;
-        for section in ["shell", "volume", "camera", "image", "march", "shading"] {
+        for section in ["shell", "volume", "camera", "image", "march", "shading", "base"] {
             let (_, documented) = DOCUMENTATION.split_once(&format!("\n## `[{section}]`")).unwrap();
             let documented = documented.split("\n## ").next().unwrap();
             for key in keys(section) {
@@ -300,14 +356,17 @@ recipe = "fog.toml"
                 found += 1;
             }
         }
-        assert_eq!(found, 4 + 8 + 5 + 2 + 3 + 7);
-        let text = Text::new("keys", format!("{SCENE}[[light]]\nunknown_key = 1"), &[]).unwrap();
-        let message = text.parse::<SceneFile>(("mesh", "generator")).unwrap_err().to_string();
-        let (_, documented) = DOCUMENTATION.split_once("\n## `[[light]]`").unwrap();
-        let keys: Vec<&str> =
-            message.split_once(", expected ").unwrap().1.split('`').skip(1).step_by(2).collect();
-        assert_eq!(keys.len(), 4);
-        assert!(keys.iter().all(|key| documented.contains(&format!("\n| `{key}` |"))), "{keys:?}");
+        assert_eq!(found, 4 + 8 + 5 + 2 + 3 + 10 + 2);
+        for (section, count) in [("light", 5), ("solid", 5)] {
+            let text = Text::new("keys", format!("{SCENE}[[{section}]]\nunknown_key = 1"), &[]).unwrap();
+            let message = text.parse::<SceneFile>(("mesh", "generator")).unwrap_err().to_string();
+            let (_, documented) = DOCUMENTATION.split_once(&format!("\n## `[[{section}]]`")).unwrap();
+            let documented = documented.split("\n## ").next().unwrap();
+            let keys: Vec<&str> =
+                message.split_once(", expected ").unwrap().1.split('`').skip(1).step_by(2).collect();
+            assert_eq!(keys.len(), count);
+            assert!(keys.iter().all(|key| documented.contains(&format!("\n| `{key}` |"))), "{keys:?}");
+        }
         for generator in ["plane", "tube", "sphere", "torus", "vase", "teapot"] {
             let scene = format!("[mesh]\ngenerator = \"{generator}\"\nunknown_key = 1");
             let text = Text::new("keys", scene, &[]).unwrap();

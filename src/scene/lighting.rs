@@ -6,7 +6,7 @@ use glam::DVec3;
 use toml::Spanned;
 
 use super::file::{LightSection, SceneFile, ShadingSection};
-use super::shading::{MOST_LIGHTS, Model, Shading};
+use super::shading::{Emission, MOST_LIGHTS, Model, Shading};
 use super::text::Text;
 use super::{Camera, Light, Source};
 use crate::Result;
@@ -112,6 +112,8 @@ impl<'a> Lighting<'a> {
             diffuse: section.diffuse.0,
             specular: section.specular.0,
             shininess: section.shininess.0,
+            emission: Emission { glow: section.glow.0, from: section.glow_from.0 },
+            shadow_size: section.shadow_size.0,
             lights: self.lights.iter().map(|(_, light)| *light).collect(),
             directions,
         }
@@ -139,5 +141,5 @@ fn light(text: &Text, section: &Spanned<LightSection>) -> Result<Light> {
             return Err(text.error(section.span(), message));
         }
     };
-    Ok(Light { source, colour })
+    Ok(Light { source, colour, shadow: section.get_ref().shadow })
 }

@@ -7,6 +7,7 @@ use glam::{DVec2, DVec3};
 use super::camera::DEFAULT_NEAR;
 use super::file::{CameraSection, Plan, SceneFile};
 use super::lighting::Lighting;
+use super::solids::Solids;
 use super::source::{MeshSource, VolumeSource};
 use super::text::Text;
 use super::{Camera, March, Medium, Scene, Sizes, View, span, texel_edges};
@@ -78,6 +79,7 @@ fn build(
     let mesh = MeshSource::of(text, &file.mesh)?;
     let volume = VolumeSource::of(text, &file.volume, base_dir)?;
     let lighting = Lighting::of(text, &file, base_dir)?;
+    let solids = Solids::read(text, file.base.as_ref(), &file.solid, base_dir)?;
     let [width, height] = file.image.size.0.map(|pixels| pixels.0);
     let admit = |volume| admit(&Sizes { picture: [width, height], volume });
     if let VolumeSource::Recipe(recipe) = &volume {
@@ -146,6 +148,7 @@ fn build(
             Plan::Exact => March::Exact,
         },
         shading,
+        solids: solids.build(&mesh),
         shell,
         volume,
     };
@@ -337,8 +340,9 @@ recipe = "fog.toml"
         assert_eq!((shading.diffuse, shading.specular, shading.shininess), (1.0, 0.2, 32.0));
         let position = DVec3::new(1.0, 2.0, 3.0);
         let expected = [
-            Light { source: Source::Directional { towards: DVec3::Y }, colour: DVec3::ONE },
+            Light { source: Source::Directional { towards: DVec3::Y }, colour: DVec3::ONE, shadow: false },
             Light {
+                shadow: false,
                 source: Source::Point { position, falloff: Some(0.5) },
                 colour: DVec3::new(1.0, 0.0, 4.0),
             },

@@ -22,13 +22,18 @@ pub mod file;
 mod lighting;
 pub mod load;
 pub mod shading;
+pub mod shadow;
+pub mod solid;
+mod solids;
 mod source;
 pub mod span;
 pub(crate) mod text;
 
 pub use camera::{Camera, View};
 pub use load::{Loaded, load, load_if, parse};
-pub use shading::{Light, Model, Shading, Source};
+pub use shading::{Emission, Light, Model, Shading, Source};
+pub use shadow::LightView;
+pub use solid::Solid;
 
 use std::fmt;
 
@@ -49,6 +54,8 @@ pub struct Scene {
     pub medium: Medium,
     /// How light makes its colours; without it they are what it sends out.
     pub shading: Option<Shading>,
+    /// Opaque surfaces beside the volume, or in its midst.
+    pub solids: Vec<Solid>,
     /// Where it is seen from, how large, and whether depth is wanted.
     pub view: View,
     /// How finely the `shell` method marches.
@@ -162,6 +169,7 @@ impl Scene {
             volume,
             medium: Medium { opacity_distance, lod_footprint: PIXEL_FOOTPRINT },
             shading: None,
+            solids: Vec::new(),
             view: View { camera, width: 512, height: 512, depth: false },
             march: March::default(),
         }

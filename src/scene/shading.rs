@@ -5,12 +5,13 @@
 //! both at the medium's level of detail. Then
 //!
 //! ```text
-//!   colour = c (ambient + sum of E diffuse D) + sum of E specular S      over all lights
+//!   colour = c (ambient + sum of E diffuse D + G) + sum of E specular S      over all lights
 //!
 //!   a = |V| / W, at most 1                how far the directions filtered here agree; 0 where there is none
 //!   d = F V / |F V|                       in world space; F: the shell's Frames, interpolated
 //!   l, e, h                               to the light, to the eye, half-way between the two; of unit length
-//!   E                                     what reaches the point from the light
+//!   E                                     what reaches the point from the light: shadow, falloff
+//!   G = glow max(0, min(1, (m - from) / (1 - from)))   what the texel sends out itself; m: the largest of red, green, blue of c
 //!
 //!   surface:  D = a max(0, d.l) + (1 - a) / 4
 //!             S = a max(0, d.l) max(0, d.h)^shininess
@@ -26,7 +27,8 @@
 //!   whose highlight is a reflectance here: the factor `d.l` lets it end where the light does, without an edge.
 //! - `fibre` is J. T. Kajiya, T. L. Kay, *Rendering fur with three dimensional textures*, 1989, for vectors that all point away
 //!   from the fibre: a cylinder mirrors light into the cone about it on the other side, hence the minus.
-//! - Nothing casts a shadow.
+//! - The glow is the paper's (section 5.3): colours select the voxels "where light is added in the integral".
+//! - A light casts shadows where [`Light::shadow`] says so: see [`shadow`](super::shadow).
 
 use glam::DVec3;
 use serde::Deserialize;
@@ -36,6 +38,12 @@ use crate::volume::Directions;
 
 /// The most lights of a scene; each costs at every sample.
 pub const MOST_LIGHTS: usize = 64;
+
+/// The least of [`Shading::shadow_size`].
+pub const LEAST_SHADOW_SIZE: u32 = 16;
+
+/// [`Shading::shadow_size`] where nothing else is said.
+pub const DEFAULT_SHADOW_SIZE: u32 = 1024;
 
 /// Material and lights of a scene.
 #[derive(Debug, Clone, PartialEq)]
@@ -50,10 +58,24 @@ pub struct Shading {
     pub specular: f64,
     /// Exponent of `S`, at least 1.
     pub shininess: f64,
+    /// What texels send out of themselves.
+    pub emission: Emission,
+    /// Pixels a side of the pictures that lights with shadows take: see [`shadow`](super::shadow). At least
+    /// [`LEAST_SHADOW_SIZE`].
+    pub shadow_size: u32,
     /// At most [`MOST_LIGHTS`].
     pub lights: Vec<Light>,
     /// Normals or tangents, one a texel of the scene's volume, with as many levels.
     pub directions: Directions,
+}
+
+/// What texels send out of themselves: `G` at the head of this module. Bright colours glow, others do not.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Emission {
+    /// Factor, at least 0.
+    pub glow: f64,
+    /// The brightness, 0 or above and below 1, from which a colour begins to glow; it does so fully from 1 on.
+    pub from: f64,
 }
 
 /// How light is sent on.
@@ -73,6 +95,8 @@ pub struct Light {
     pub source: Source,
     /// Linear, each at least 0; of a point light that of no distance.
     pub colour: DVec3,
+    /// Whether the volume and the solids stand in its way.
+    pub shadow: bool,
 }
 
 /// Where light comes from.
@@ -108,6 +132,9 @@ impl Shading {
     /// scene is brighter than `colour * factor + added`.
     pub fn bounds(&self) -> (f64, f64) {
         let light: DVec3 = self.lights.iter().map(|light| light.colour).sum();
-        ((self.ambient + self.diffuse * light).max_element(), self.specular * light.max_element())
+        (
+            (self.ambient + self.diffuse * light).max_element() + self.emission.glow,
+            self.specular * light.max_element(),
+        )
     }
 }

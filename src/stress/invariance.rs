@@ -88,7 +88,15 @@ fn in_waves(mesh: &Mesh, scale: f64, view: View) -> Result<Arc<Scene>> {
     let options = ShellOptions { uv_scale: DVec2::new(3.0, 2.0), ..ShellOptions::new(scale * THICKNESS) };
     let shell = Shell::build(mesh, &options)?;
     let medium = Medium { opacity_distance: 0.2 * scale, lod_footprint: 1.0 };
-    Ok(Arc::new(Scene { shell, volume: waves(), medium, shading: None, view, march: March::default() }))
+    Ok(Arc::new(Scene {
+        shell,
+        volume: waves(),
+        medium,
+        shading: None,
+        solids: Vec::new(),
+        view,
+        march: March::default(),
+    }))
 }
 
 /// The largest difference between two pictures of a scene; infinite where there is next to nothing in them to differ.

@@ -30,7 +30,15 @@ pub fn constant_scene(mesh: &Mesh, thickness: f64, alpha: f32, colour: f32, view
 /// A shell in a texture of columns along u, one a paint, of which alpha is the opacity over `opacity_distance`.
 pub fn painted(shell: Shell, paints: &[Paint], opacity_distance: f64, view: View) -> Scene {
     let medium = Medium { opacity_distance, lod_footprint: 0.0 };
-    Scene { shell, volume: columns(paints), medium, shading: None, view, march: March::default() }
+    Scene {
+        shell,
+        volume: columns(paints),
+        medium,
+        shading: None,
+        solids: Vec::new(),
+        view,
+        march: March::default(),
+    }
 }
 
 /// A texture of columns along u, each of one paint.

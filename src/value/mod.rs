@@ -8,6 +8,6 @@ pub use colour::Colour;
 pub use list::Exactly;
 pub(crate) use list::exactly;
 pub use number::{
-    FieldOfView, Finite, Fraction, NotNegative, PictureSize, Pixels, Positive, Rounds, Runs, Samples,
-    Shininess, Step,
+    BelowOne, FieldOfView, Finite, Fraction, NotNegative, PictureSize, Pixels, Positive, Rounds, Runs,
+    Samples, ShadowSize, Shininess, Step,
 };

@@ -94,12 +94,20 @@ number! {
     Fraction = "a number from 0 to 1", |value| (0.0..=1.0).contains(&value)
 }
 number! {
+    /// From 0 to 1, the latter excluded.
+    BelowOne = "a number from 0 to 1, excluding 1", |value| (0.0..1.0).contains(&value)
+}
+number! {
     /// An angle in degrees, above 0 and below 180.
     FieldOfView = "an angle in degrees between 0 and 180, both excluded", |value| value > 0.0 && value < 180.0
 }
 count! {
     /// The width or height of a picture, in pixels.
     Pixels = 1..=32768
+}
+count! {
+    /// Pixels a side of a light's picture.
+    ShadowSize = 16..=16384
 }
 count! {
     /// Rounds of smoothing.

@@ -10,10 +10,8 @@ use std::io::Cursor;
 use std::path::Path;
 
 use glam::Vec3;
-use image::ImageReader;
 
 use super::check::{MaterialFile, check_numbers};
-use crate::frame::srgb::linear_from_srgb;
 use crate::mesh::model::{Material, Texture};
 use crate::{Error, Result, input};
 
@@ -45,7 +43,7 @@ fn parse(path: &Path, text: &str) -> Result<HashMap<String, Material>> {
     let folder = path.parent().unwrap_or(Path::new(""));
     let material = |material: tobj::Material| {
         let colour = Vec3::from(material.diffuse.unwrap_or([1.0; 3]).map(|x| x as f32));
-        let texture = material.diffuse_texture.map(|name| texture(&folder.join(name))).transpose()?;
+        let texture = material.diffuse_texture.map(|name| Texture::read(&folder.join(name))).transpose()?;
         Ok((material.name, Material { colour, texture }))
     };
     materials.into_iter().map(material).collect()
@@ -84,27 +82,10 @@ fn checked(path: &Path, text: &str) -> Result<String> {
     Ok(kept)
 }
 
-fn texture(path: &Path) -> Result<Texture> {
-    let unreadable = |error: String| {
-        Error::input(path, format!("the texture cannot be read: {error}"))
-            .with_help("textures are PNG or JPEG pictures; their names are relative to the material file")
-    };
-    input::open(path).map_err(|error| unreadable(error.to_string()))?;
-    // The reader's own limits bound the memory that a header may claim.
-    let picture = ImageReader::open(path)
-        .and_then(ImageReader::with_guessed_format)
-        .map_err(|error| unreadable(error.to_string()))?
-        .decode()
-        .map_err(|error| unreadable(error.to_string()))?
-        .into_rgb32f();
-    let (width, height) = picture.dimensions();
-    let pixels = picture.pixels().map(|pixel| Vec3::from(pixel.0.map(linear_from_srgb))).collect();
-    Ok(Texture::new(width as usize, height as usize, pixels))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::frame::srgb::linear_from_srgb;
 
     #[test]
     fn colours_and_textures_are_read() {

@@ -144,7 +144,7 @@ fn lighting(shading: &Shading, view: &View, unit: f64) -> Vec<u8> {
         count: shading.lights.len() as u32,
         padding: 0,
     };
-    let source = |&Light { source, colour }: &Light| {
+    let source = |&Light { source, colour, .. }: &Light| {
         let colour = colour.as_vec3();
         match source {
             Source::Directional { towards } => {
