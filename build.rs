@@ -1,8 +1,8 @@
 //! Compiles every `glsl/*.STAGE.glsl` to SPIR-V with glslang; an error stops the build with file and line.
 //!
-//! A stage file may ask for variants by lines `// variant: NAME DEFINE...`: it is then compiled once more, with
-//! each `DEFINE` defined, as `NAME`. The result is a Rust file with one constant a shader, included by
-//! `src/gpu/shaders.rs`.
+//! A stage file may have a line `// switches: NAME NAME(OTHER)...`: it is then compiled once for each set of these names, with
+//! each of the set defined; a name with another in brackets only together with that. The result is a Rust file with one
+//! family of shaders a stage file, included by `src/gpu/shaders.rs`.
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -50,6 +50,7 @@ fn compile_all(folder: &Path) -> Result<String, String> {
         .collect();
     files.sort();
     let mut rust = String::new();
+    let mut families = Vec::new();
     for path in files {
         let text = std::fs::read_to_string(&path).map_err(|error| format!("{}: {error}", path.display()))?;
         let file = path.file_name().expect("listed files have names").to_string_lossy();
@@ -57,42 +58,54 @@ fn compile_all(folder: &Path) -> Result<String, String> {
             .strip_suffix(".glsl")
             .and_then(|rest| rest.rsplit_once('.'))
             .ok_or_else(|| format!("{}: a shader is named STEM.STAGE.glsl", path.display()))?;
-        let mut variants = vec![(stem.to_owned(), None)];
-        for line in text.lines().filter_map(|line| line.strip_prefix("// variant: ")) {
-            let (name, define) = line
-                .split_once(' ')
-                .ok_or_else(|| format!("{}: a variant is `// variant: NAME DEFINE...`", path.display()))?;
-            variants.push((name.to_owned(), Some(define)));
+        let line = text.lines().find_map(|line| line.strip_prefix("// switches: ")).unwrap_or_default();
+        let switches: Vec<Switch<'_>> = line.split_whitespace().map(Switch::parse).collect();
+        let names: Vec<&str> = switches.iter().map(|switch| switch.name).collect();
+        let family = format!("{}_{}", stem.to_uppercase(), stage.to_uppercase());
+        let mut variants = String::new();
+        for set in 0..1_usize << switches.len() {
+            let on: Vec<&str> =
+                (0..names.len()).filter(|bit| set >> bit & 1 == 1).map(|bit| names[bit]).collect();
+            let is_possible = switches.iter().all(|switch| {
+                !on.contains(&switch.name) || switch.needs.is_none_or(|needs| on.contains(&needs))
+            });
+            if is_possible {
+                let words = compile(folder, &path, &text, stage, &on)?;
+                write!(variants, "Some(Spirv(&{words:?})), ").expect("writing to a string");
+            } else {
+                variants.push_str("None, ");
+            }
         }
-        for (name, define) in variants {
-            let words = compile(folder, &path, &text, stage, define)?;
-            writeln!(
-                rust,
-                "/// SPIR-V of `{}`{}.",
-                path.display(),
-                define.map_or(String::new(), |define| format!(" with `{define}` defined"))
-            )
-            .and_then(|()| {
-                writeln!(
-                    rust,
-                    "pub const {}_{}: Spirv = Spirv(&{words:?});",
-                    name.to_uppercase(),
-                    stage.to_uppercase()
-                )
-            })
-            .expect("writing to a string");
-        }
+        writeln!(
+            rust,
+            "/// `{}`.\npub static {family}: Family = Family {{ switches: &{names:?}, variants: &[{variants}] }};",
+            path.display(),
+        )
+        .expect("writing to a string");
+        families.push(format!("&{family}"));
     }
+    writeln!(rust, "/// Every one of them.\npub static ALL: &[&Family] = &[{}];", families.join(", "))
+        .expect("writing to a string");
     Ok(rust)
 }
 
-fn compile(
-    folder: &Path,
-    path: &Path,
-    text: &str,
-    stage: &str,
-    define: Option<&str>,
-) -> Result<Vec<u32>, String> {
+/// A name that a shader may be compiled with.
+struct Switch<'a> {
+    name: &'a str,
+    /// Another that it makes no sense without.
+    needs: Option<&'a str>,
+}
+
+impl<'a> Switch<'a> {
+    fn parse(word: &'a str) -> Self {
+        match word.split_once('(') {
+            Some((name, needs)) => Self { name, needs: Some(needs.trim_end_matches(')')) },
+            None => Self { name: word, needs: None },
+        }
+    }
+}
+
+fn compile(folder: &Path, path: &Path, text: &str, stage: &str, on: &[&str]) -> Result<Vec<u32>, String> {
     let stage = match stage {
         "vert" => ShaderStage::Vertex,
         "frag" => ShaderStage::Fragment,
@@ -109,8 +122,7 @@ fn compile(
         target: Target::Vulkan { version: VulkanVersion::Vulkan1_1, spirv_version: SpirvVersion::SPIRV1_3 },
         ..CompilerOptions::default()
     };
-    let defines: Vec<(&str, Option<&str>)> =
-        define.unwrap_or_default().split_whitespace().map(|name| (name, Some("1"))).collect();
+    let defines: Vec<(&str, Option<&str>)> = on.iter().map(|name| (*name, Some("1"))).collect();
     let mut includes = Includes(folder.join("include"));
     let input = ShaderInput::new(&source, stage, &options, Some(&defines[..]), Some(&mut includes))
         .map_err(|error| explain(&error))?;

@@ -1,8 +1,6 @@
 #version 450
 #extension GL_ARB_shading_language_include : require
-// variant: cycle_depth DEPTH
-// variant: cycle_lit LIT
-// variant: cycle_lit_depth LIT DEPTH
+// switches: DEPTH SOLIDS LIT SHADOWS(LIT)
 // Resolves a cycle of tetrahedra per pixel: no order of them is right for all rays (Kraus and Ertl 2001, who sort the
 // members of such a cycle per pixel). Goes from one entry or exit on the ray to the next, with the members that are active
 // between the two; where several are (the shell overlaps itself) their media add. A pixel that is too much for that is left to
@@ -13,61 +11,19 @@
 #include "ray.glsl"
 #include "sample.glsl"
 #include "march.glsl"
-
-layout(set = 0, binding = 0, std430) readonly buffer Cells { Cell cells[]; };
-layout(set = 0, binding = 2, std430) readonly buffer Members { uint list[]; };
-
-layout(location = 0) flat in uvec2 members; // range of the list of cells: first, end
+#include "solids.glsl"
+#include "gather.glsl"
 
 layout(location = 0) out vec4 out_rgba; // premultiplied
 #ifdef DEPTH
 layout(location = 1) out vec4 out_depth; // (distance * alpha, 0, 0, alpha)
 #endif
 
-// Passes through loops after which a pixel is left to the host. lavapipe ends all loops of a pixel after 65,535, and says nothing;
-// and a device that is busy for seconds is taken for hung.
-const uint MOST_PASSES = 60000;
-uint passes = 0;
-// lavapipe runs eight pixels at once, all of them as often as the one that needs it most: what differs among them may count
-// eightfold.
-const uint AT_ONCE = 8;
-
-// The nearest of the members that the ray meets, by entry, and where it meets them.
-const uint MOST_HITS = 64;
-uint hits[MOST_HITS];
-vec2 spans[MOST_HITS];
-
-// Fills `hits` and `spans` with members that end beyond depth `done`; returns their number, and in `horizon` the depth up to
-// which no other member reaches.
-uint gather(vec3 ray, float done, out float horizon) {
-    uint count = 0;
-    horizon = 3.0e38;
-    passes += 2 * (members.y - members.x);
-    for (uint member = members.x; member < members.y; member++) {
-        uint cell = list[member];
-        vec2 span = interval(cells[cell].planes, ray);
-        if (!(span.y > span.x) || span.y <= done) continue;
-        if (count == MOST_HITS) {
-            // The farthest gives way, or this one is it.
-            horizon = min(horizon, max(span.x, spans[MOST_HITS - 1].x));
-            if (span.x >= spans[MOST_HITS - 1].x) continue;
-            count--;
-        }
-        uint place = count++;
-        passes += AT_ONCE * (place + 1);
-        for (; place > 0 && spans[place - 1].x > span.x; place--) {
-            spans[place] = spans[place - 1];
-            hits[place] = hits[place - 1];
-        }
-        passes -= AT_ONCE * place;
-        spans[place] = span;
-        hits[place] = cell;
-    }
-    return count;
-}
-
 void main() {
     vec3 ray = pixel_ray();
+#ifdef SOLIDS
+    farthest = solid_depth();
+#endif
     float per_depth = length(ray) * view.per_opacity_distance;
     Gathered gathered = Gathered(vec4(0.0), vec4(0.0));
     float mean_distance = 0.0;
@@ -75,7 +31,7 @@ void main() {
     float horizon;
     bool done = false;
     do {
-        uint count = gather(ray, z, horizon);
+        uint count = gather(vec3(0.0), ray, z, horizon);
         done = count == 0;
         if (done) break;
         z = max(z, spans[0].x);

@@ -1,8 +1,6 @@
 #version 450
 #extension GL_ARB_shading_language_include : require
-// variant: shell_depth DEPTH
-// variant: shell_lit LIT
-// variant: shell_lit_depth LIT DEPTH
+// switches: DEPTH SOLIDS LIT SHADOWS(LIT)
 // Marches the segment of one ray in one tetrahedron.
 // Dufort, Leblanc, Poulin 2005, sections 4.2 and 4.3, with one change: entry and exit are not interpolated over the
 // front faces but found per pixel from the four planes, so that the rasteriser's snapping of vertices does not move them.
@@ -14,6 +12,7 @@
 #include "ray.glsl"
 #include "sample.glsl"
 #include "march.glsl"
+#include "solids.glsl"
 
 layout(location = 0) flat in vec4 planes[4];
 layout(location = 4) flat in vec4 texture_rows[3];
@@ -29,6 +28,9 @@ layout(location = 1) out vec4 out_depth; // (distance * alpha, 0, 0, alpha)
 void main() {
     vec3 ray = pixel_ray();
     vec2 segment = interval(planes, ray);
+#ifdef SOLIDS
+    segment.y = min(segment.y, solid_depth());
+#endif
     if (!(segment.y > segment.x)) discard;
 
 #ifdef LIT

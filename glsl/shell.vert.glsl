@@ -1,6 +1,6 @@
 #version 450
 #extension GL_ARB_shading_language_include : require
-// variant: shell_lit LIT
+// switches: LIT
 // The outline of a tetrahedron as two triangles; what shell.frag.glsl needs of it goes along unchanged.
 
 #include "shell.glsl"

@@ -12,16 +12,29 @@ bool is_beside(vec3 inward) {
 }
 
 // Depths of entry and exit (Cyrus-Beck clipping), entry no nearer than the near plane; entry < exit where the ray meets the
-// tetrahedron. Cells that share a face hold the same plane, negated: one ends bit for bit where the other begins.
-vec2 interval(vec4 planes[4], vec3 ray) {
+// tetrahedron. `heights` are those of the planes above the ray's origin. Cells that share a face hold the same plane, negated:
+// one ends bit for bit where the other begins.
+vec2 clip(vec4 planes[4], float heights[4], vec3 ray) {
     float entry = view.near;
     float exit = 3.0e38;
     for (int i = 0; i < 4; i++) {
         float towards_inside = dot(planes[i].xyz, ray);
-        float depth = planes[i].w / towards_inside;
+        float depth = heights[i] / towards_inside;
         if (towards_inside > 0.0) entry = max(entry, depth);
         else if (towards_inside < 0.0) exit = min(exit, depth);
-        else if (planes[i].w > 0.0 || (planes[i].w == 0.0 && !is_beside(planes[i].xyz))) exit = entry; // parallel to the face
+        else if (heights[i] > 0.0 || (heights[i] == 0.0 && !is_beside(planes[i].xyz))) exit = entry; // parallel to the face
     }
     return vec2(entry, exit);
+}
+
+// Of a ray from the eye.
+vec2 interval(vec4 planes[4], vec3 ray) {
+    return clip(planes, float[](planes[0].w, planes[1].w, planes[2].w, planes[3].w), ray);
+}
+
+// Of a ray from elsewhere.
+vec2 interval_from(vec4 planes[4], vec3 origin, vec3 ray) {
+    float heights[4];
+    for (int i = 0; i < 4; i++) heights[i] = planes[i].w - dot(planes[i].xyz, origin);
+    return clip(planes, heights, ray);
 }

@@ -9,29 +9,45 @@ layout(constant_id = 1) const bool MINIFIED = true; // whether any level but 0 c
 
 layout(constant_id = 2) const bool EXTINCTION = false; // what the fourth channel holds; else opacity
 
-#ifdef LIT
-layout(set = 0, binding = 6) uniform sampler3D volume; // premultiplied
-#else
-layout(set = 0, binding = 3) uniform sampler3D volume; // premultiplied
-#endif
+layout(set = 0, binding = 8) uniform sampler3D volume; // premultiplied
 
 // The texture along a ray: affine in depth.
 struct Path {
     vec3 at_eye;      // texture coordinates at depth 0
     vec3 from_depth;  // and their change per unit of depth
     float detail;     // footprint of the pixel at depth 1, in level-0 texels
+#ifdef LIGHT
+    bool is_parallel; // all pixels' rays are; the footprint is the same everywhere
+#endif
 };
 
-Path path_in(vec4 rows[3], vec3 ray) {
-    // Across the ray alone: the pixel has no width along it.
+// The greatest density of level-0 texels along an axis across the ray, times the ray's length: a pixel has no width along it.
+float texels_across(vec4 rows[3], vec3 ray) {
     vec3 across = view.texels
         * vec3(length(cross(rows[0].xyz, ray)), length(cross(rows[1].xyz, ray)), length(cross(rows[2].xyz, ray)));
-    return Path(vec3(rows[0].w, rows[1].w, rows[2].w),
-                vec3(dot(rows[0].xyz, ray), dot(rows[1].xyz, ray), dot(rows[2].xyz, ray)),
-                view.lod_scale * max(across.x, max(across.y, across.z)) / length(ray));
+    return max(across.x, max(across.y, across.z));
 }
 
+#ifdef LIGHT
+// Of a light, whose footprint grows with the distance from it.
+Path path_from(vec4 rows[3], vec3 origin, vec3 ray, float pixel, bool is_parallel) {
+    return Path(vec3(dot(rows[0].xyz, origin), dot(rows[1].xyz, origin), dot(rows[2].xyz, origin))
+                    + vec3(rows[0].w, rows[1].w, rows[2].w),
+                vec3(dot(rows[0].xyz, ray), dot(rows[1].xyz, ray), dot(rows[2].xyz, ray)),
+                view.lod_scale * pixel * texels_across(rows, ray), is_parallel);
+}
+#else
+Path path_in(vec4 rows[3], vec3 ray) {
+    return Path(vec3(rows[0].w, rows[1].w, rows[2].w),
+                vec3(dot(rows[0].xyz, ray), dot(rows[1].xyz, ray), dot(rows[2].xyz, ray)),
+                view.lod_scale * texels_across(rows, ray) / length(ray));
+}
+#endif
+
 float level_of_detail(Path path, float depth) {
+#ifdef LIGHT
+    if (path.is_parallel) depth = 1.0;
+#endif
     return clamp(log2(depth * path.detail), 0.0, view.last_level);
 }
 

@@ -1,38 +1,13 @@
 // The colour of a point in a lit scene: src/scene/shading.rs defines it.
 
 #include "frame.glsl"
+#include "lights.glsl"
 
 layout(constant_id = 3) const bool FIBRE = false; // directions are tangents; else normals
 
-layout(set = 0, binding = 7) uniform sampler3D directions; // times their weight, which is the fourth
+layout(constant_id = 4) const bool GLOW = false; // whether bright colours do
 
-struct LightSource {
-    vec4 place;  // towards it, or where it is; 1 / falloff, 0 where there is none
-    vec4 colour; // the fourth: 0 directional, 1 a point
-};
-
-layout(set = 0, binding = 5, std430) readonly buffer Lighting {
-    vec4 world_from_view[3]; // columns
-    vec3 ambient;
-    float diffuse;
-    float specular;
-    float shininess;
-    uint count;
-    LightSource sources[];
-} lighting;
-
-// The light that reaches a point, and the unit vector towards it. What stands between the two would be asked here.
-vec3 arriving(LightSource light, vec3 point, out vec3 to_light) {
-    if (light.colour.w == 0.0) {
-        to_light = light.place.xyz;
-        return light.colour.rgb;
-    }
-    vec3 way = light.place.xyz - point;
-    float distance = length(way);
-    to_light = distance > 0.0 ? way / distance : vec3(0.0);
-    float falls = distance * light.place.w;
-    return light.colour.rgb / (1.0 + falls * falls);
-}
+layout(set = 0, binding = 9) uniform sampler3D directions; // times their weight, which is the fourth
 
 // As `fetch`.
 vec4 fetch_direction(Path path, float depth) {
@@ -81,6 +56,10 @@ vec4 radiant(Path path, float depth) {
         float mean = FIBRE ? 0.78539816339744831 : 0.25; // pi / 4: see src/scene/shading.rs
         scattered += light * (lighting.diffuse * mix(mean, aligned, agreement));
         mirrored += light * (lighting.specular * agreement * lobe);
+    }
+    if (GLOW) {
+        float brightest = max(texel.r, max(texel.g, texel.b)) / texel.a;
+        scattered += lighting.glow * clamp((brightest - lighting.glow_from) / (1.0 - lighting.glow_from), 0.0, 1.0);
     }
     return vec4(texel.rgb * scattered + texel.a * mirrored, texel.a);
 }

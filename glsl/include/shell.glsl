@@ -1,4 +1,5 @@
 // What the shell shaders share with src/method/shell; tests/layout.rs compares the two from the SPIR-V.
+// Bindings: 0 to 7 are buffers, from 8 on textures; each has one number in all shaders.
 //
 // View space here: origin at the eye, x right, y up, z = depth *into* the picture. Lengths are in parts of `Seen::unit`.
 
@@ -21,8 +22,9 @@ struct Cell {
     vec4 texture[3];     // u, v, w of a point: dot(row.xyz, point) + row.w
 };
 
-// A square of pixels in which tetrahedra meet that no order is right for.
+// A square of pixels, and the tetrahedra that are seen in it.
 struct Tile {
     vec4 bounds;         // clip space: left, top, right, bottom
     uvec2 members;       // range of the list of cells: first, end
+    uint picture;        // of a light: which
 };

@@ -2,6 +2,7 @@
 
 use std::collections::VecDeque;
 use std::ops::{AddAssign, Range};
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use ash::vk;
@@ -14,21 +15,48 @@ use super::target::Target;
 use super::texture::Texture3d;
 use crate::Result;
 
-/// Draws into a cleared target, one after another: blending keeps their order.
+/// Draws into a target, one after another: blending keeps their order.
 #[derive(Clone, Copy)]
 pub struct Draw<'a> {
     /// Where to.
     pub target: &'a Target,
-    /// For every pipeline, at the bindings 0, 1, ...
-    pub buffers: &'a [&'a Buffer],
-    /// For every pipeline, at the bindings after those.
-    pub textures: &'a [&'a Texture3d],
+    /// Whether the target is cleared to zero first; else what is drawn is laid on what there is.
+    pub clears: bool,
+    /// By binding: all that any of the pipelines has.
+    pub buffers: &'a [(u32, &'a Buffer)],
+    /// By binding: all that any of the pipelines has.
+    pub textures: &'a [(u32, Sampled<'a>)],
     /// As many bytes as the pipelines were built with.
     pub push_constants: &'a [u8],
     /// What is drawn, in order.
     pub batches: &'a [Batch<'a>],
     /// Hears now and then which part of the vertices is done, 0 to 1; an error ends the drawing.
     pub between: &'a dyn Fn(f64) -> Result<()>,
+}
+
+/// What a fragment shader reads.
+#[derive(Debug, Clone, Copy)]
+pub enum Sampled<'a> {
+    /// Filtered.
+    Texture(&'a Texture3d),
+    /// This image of a target that was made [for shaders](Target::sampled) and has been drawn, pixel by pixel.
+    Picture(&'a Target, usize),
+}
+
+impl Sampled<'_> {
+    pub(super) fn gpu(&self) -> &Arc<Gpu> {
+        match self {
+            Self::Texture(texture) => &texture.gpu,
+            Self::Picture(target, _) => &target.gpu,
+        }
+    }
+
+    pub(super) fn sampler_and_view(&self) -> (vk::Sampler, vk::ImageView) {
+        match self {
+            Self::Texture(texture) => (texture.sampler, texture.image.view),
+            Self::Picture(target, image) => (target.sampler, target.images[*image].view),
+        }
+    }
 }
 
 /// Some triangles through one pipeline, which was built for a target with the same number of attachments.
@@ -63,7 +91,7 @@ const FIRST_PART: u64 = 16;
 /// The next may be larger than the one before it by this factor.
 const MOST_GROWTH: f64 = 8.0;
 
-/// Clears the target to zero, draws, copies the target to host memory and waits for all of it. Device times
+/// Draws, copies a target of the host's to its memory, and waits for all of it. Device times
 /// are `None` where the device has no timestamps.
 ///
 /// The work is submitted in parts of about a quarter of a second, judged by the part before. Where they end makes no difference
@@ -93,7 +121,7 @@ pub fn draw(draw: &Draw<'_>) -> Result<Option<DrawTimes>> {
     let all = count(&rest);
     let mut part = all.div_ceil(FIRST_PART);
     let mut times = DrawTimes::default();
-    let mut render_pass = target.clearing;
+    let mut render_pass = if draw.clears { target.clearing } else { target.continuing };
     loop {
         let begun = Instant::now();
         let batches = take(&mut rest, part);
@@ -163,8 +191,9 @@ fn submit_part(
             timestamps.reset(commands);
         }
         stamp(commands, vk::PipelineStageFlags::TOP_OF_PIPE, 0);
-        let clears =
-            vec![vk::ClearValue { color: vk::ClearColorValue { float32: [0.0; 4] } }; target.images.len()];
+        // Of colours and of depths; depth 0 is the farthest.
+        let attachments = target.images.len() + usize::from(target.depth.is_some());
+        let clears = vec![vk::ClearValue { color: vk::ClearColorValue { float32: [0.0; 4] } }; attachments];
         let begin = vk::RenderPassBeginInfo::default()
             .render_pass(render_pass)
             .framebuffer(target.framebuffer)

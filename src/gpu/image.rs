@@ -27,6 +27,7 @@ impl DeviceImage {
         name: &str,
         info: &vk::ImageCreateInfo<'_>,
         view_type: vk::ImageViewType,
+        aspect: vk::ImageAspectFlags,
     ) -> Result<Self> {
         // SAFETY: the caller checked sides against the limits, and the format against its features.
         let raw = unsafe { gpu.raw.create_image(info, None) }
@@ -54,7 +55,7 @@ impl DeviceImage {
             .image(raw)
             .view_type(view_type)
             .format(info.format)
-            .subresource_range(whole());
+            .subresource_range(vk::ImageSubresourceRange { aspect_mask: aspect, ..whole() });
         // SAFETY: the view covers the image that was just made.
         image.view = unsafe { gpu.raw.create_image_view(&view_info, None) }
             .map_err(|error| vulkan_error(&format!("creating the view of {name}"), error))?;

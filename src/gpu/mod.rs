@@ -22,8 +22,8 @@ pub mod texture;
 
 pub use buffer::Buffer;
 pub use device::{DeviceChoice, Gpu};
-pub use draw::{Batch, Draw, DrawTimes, draw};
+pub use draw::{Batch, Draw, DrawTimes, Sampled, draw};
 pub use instance::{DeviceInfo, Messages, devices};
-pub use pipeline::{Pipeline, PipelineInfo};
+pub use pipeline::{Keeps, Pipeline, PipelineInfo};
 pub use target::Target;
 pub use texture::Texture3d;

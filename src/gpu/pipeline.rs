@@ -1,4 +1,4 @@
-//! Graphics pipelines that blend front to back.
+//! Graphics pipelines: what blends front to back, and what keeps the nearest.
 
 use std::cell::Cell;
 use std::marker::PhantomData;
@@ -8,14 +8,23 @@ use ash::vk;
 
 use super::buffer::Buffer;
 use super::device::{Gpu, vulkan_error};
-use super::draw::Draw;
+use super::draw::{Draw, Sampled};
 use super::format::Rgba;
 use super::shaders::Spirv;
 use super::target::Target;
-use super::texture::Texture3d;
 use crate::Result;
 
-/// What a [`Pipeline`] is made of: numbers of bindings and bytes are those that its shaders use.
+/// What becomes of several fragments of a pixel.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Keeps {
+    /// `destination += (1 - destination.alpha) * source`, in the order in which they are drawn. Only triangles that run clockwise
+    /// on the picture are drawn.
+    Blend,
+    /// That of the greatest depth value, for targets that keep the nearest; both sides of triangles are drawn.
+    Nearest,
+}
+
+/// What a [`Pipeline`] is made of: bindings and bytes are those that its shaders use.
 #[derive(Debug, Clone, Copy)]
 pub struct PipelineInfo<'a> {
     /// The vertex shader, entry point `main`.
@@ -24,17 +33,17 @@ pub struct PipelineInfo<'a> {
     pub fragment: Spirv,
     /// Values of the specialisation constants 0, 1, ... of the fragment shader (booleans are 0 or 1).
     pub constants: &'a [u32],
-    /// Storage buffers at the bindings 0, 1, ... of set 0, read by either shader; at least 1.
-    pub storage_buffers: u32,
-    /// Sampled textures at the bindings after the buffers, read by the fragment shader; at least 1.
-    pub textures: u32,
+    /// Bindings in set 0 of the storage buffers that either shader reads.
+    pub storage_buffers: &'a [u32],
+    /// Bindings in set 0 of the textures that the fragment shader reads.
+    pub textures: &'a [u32],
     /// Size of the push constants, in bytes: 4 to 128, a multiple of 4.
     pub push_constant_bytes: u32,
+    /// What becomes of several fragments of a pixel.
+    pub keeps: Keeps,
 }
 
-/// A graphics pipeline without vertex input: triangles pulled from buffers, blended front to back,
-/// `destination += (1 - destination.alpha) * source`, no depth test. Only triangles that run clockwise on the
-/// picture are drawn.
+/// A graphics pipeline without vertex input: triangles pulled from buffers.
 #[derive(Debug)]
 pub struct Pipeline {
     pub(super) raw: vk::Pipeline,
@@ -42,8 +51,8 @@ pub struct Pipeline {
     set_layout: vk::DescriptorSetLayout,
     pool: vk::DescriptorPool,
     pub(super) set: vk::DescriptorSet,
-    buffers: u32,
-    textures: u32,
+    buffers: Vec<u32>,
+    textures: Vec<u32>,
     push_constant_bytes: u32,
     /// Of the targets that it draws into.
     format: Rgba,
@@ -63,7 +72,8 @@ impl Pipeline {
     /// Where the target is another device's, or a number in `info` is out of its range.
     pub fn new(gpu: &Arc<Gpu>, target: &Target, info: &PipelineInfo<'_>) -> Result<Self> {
         assert!(Arc::ptr_eq(gpu, &target.gpu), "the target is another device's");
-        assert!(info.storage_buffers > 0 && info.textures > 0);
+        let nearest = info.keeps == Keeps::Nearest;
+        assert_eq!(nearest, target.depth.is_some(), "a target for the other kind of pipeline");
         assert!((4..=128).contains(&info.push_constant_bytes) && info.push_constant_bytes.is_multiple_of(4));
         // From here on `Drop` cleans up, null handles included.
         let mut pipeline = Self {
@@ -72,8 +82,8 @@ impl Pipeline {
             set_layout: vk::DescriptorSetLayout::null(),
             pool: vk::DescriptorPool::null(),
             set: vk::DescriptorSet::null(),
-            buffers: info.storage_buffers,
-            textures: info.textures,
+            buffers: info.storage_buffers.to_vec(),
+            textures: info.textures.to_vec(),
             push_constant_bytes: info.push_constant_bytes,
             format: target.format,
             attachments: target.images.len(),
@@ -110,14 +120,14 @@ impl Pipeline {
         let viewports = vk::PipelineViewportStateCreateInfo::default().viewport_count(1).scissor_count(1);
         let raster = vk::PipelineRasterizationStateCreateInfo::default()
             .polygon_mode(vk::PolygonMode::FILL)
-            .cull_mode(vk::CullModeFlags::BACK)
+            .cull_mode(if nearest { vk::CullModeFlags::NONE } else { vk::CullModeFlags::BACK })
             .front_face(vk::FrontFace::CLOCKWISE)
             .line_width(1.0);
         let samples = vk::PipelineMultisampleStateCreateInfo::default()
             .rasterization_samples(vk::SampleCountFlags::TYPE_1);
         let blends = vec![
             vk::PipelineColorBlendAttachmentState {
-                blend_enable: vk::TRUE,
+                blend_enable: (!nearest).into(),
                 src_color_blend_factor: vk::BlendFactor::ONE_MINUS_DST_ALPHA,
                 dst_color_blend_factor: vk::BlendFactor::ONE,
                 color_blend_op: vk::BlendOp::ADD,
@@ -129,6 +139,10 @@ impl Pipeline {
             target.images.len()
         ];
         let blending = vk::PipelineColorBlendStateCreateInfo::default().attachments(&blends);
+        let depth = vk::PipelineDepthStencilStateCreateInfo::default()
+            .depth_test_enable(nearest)
+            .depth_write_enable(nearest)
+            .depth_compare_op(vk::CompareOp::GREATER);
         let dynamic = vk::PipelineDynamicStateCreateInfo::default()
             .dynamic_states(&[vk::DynamicState::VIEWPORT, vk::DynamicState::SCISSOR]);
         let create_info = vk::GraphicsPipelineCreateInfo::default()
@@ -138,6 +152,7 @@ impl Pipeline {
             .viewport_state(&viewports)
             .rasterization_state(&raster)
             .multisample_state(&samples)
+            .depth_stencil_state(&depth)
             .color_blend_state(&blending)
             .dynamic_state(&dynamic)
             .layout(pipeline.layout)
@@ -152,20 +167,22 @@ impl Pipeline {
     fn create_layout(&mut self) -> Result<()> {
         let raw = &self.gpu.raw;
         let mut bindings: Vec<vk::DescriptorSetLayoutBinding<'_>> = Vec::new();
-        for binding in 0..self.buffers + self.textures {
-            let (kind, stage) = if binding < self.buffers {
-                let both = vk::ShaderStageFlags::VERTEX | vk::ShaderStageFlags::FRAGMENT;
-                (vk::DescriptorType::STORAGE_BUFFER, both)
-            } else {
-                (vk::DescriptorType::COMBINED_IMAGE_SAMPLER, vk::ShaderStageFlags::FRAGMENT)
-            };
-            bindings.push(
+        let kinds = [
+            (
+                &self.buffers,
+                vk::DescriptorType::STORAGE_BUFFER,
+                vk::ShaderStageFlags::VERTEX | vk::ShaderStageFlags::FRAGMENT,
+            ),
+            (&self.textures, vk::DescriptorType::COMBINED_IMAGE_SAMPLER, vk::ShaderStageFlags::FRAGMENT),
+        ];
+        for (numbers, kind, stages) in kinds {
+            bindings.extend(numbers.iter().map(|&binding| {
                 vk::DescriptorSetLayoutBinding::default()
                     .binding(binding)
                     .descriptor_type(kind)
                     .descriptor_count(1)
-                    .stage_flags(stage),
-            );
+                    .stage_flags(stages)
+            }));
         }
         let set_info = vk::DescriptorSetLayoutCreateInfo::default().bindings(&bindings);
         // SAFETY: the structures live through the call; handles are of this device.
@@ -182,13 +199,12 @@ impl Pipeline {
         // SAFETY: as above.
         self.layout = unsafe { raw.create_pipeline_layout(&layout_info, None) }
             .map_err(|error| vulkan_error("describing the pipeline's layout", error))?;
-        let sizes = [
-            vk::DescriptorPoolSize { ty: vk::DescriptorType::STORAGE_BUFFER, descriptor_count: self.buffers },
-            vk::DescriptorPoolSize {
-                ty: vk::DescriptorType::COMBINED_IMAGE_SAMPLER,
-                descriptor_count: self.textures,
-            },
-        ];
+        // Vulkan has no pool for none of a kind.
+        let size = |(numbers, ty, _): (&Vec<u32>, _, _)| vk::DescriptorPoolSize {
+            ty,
+            descriptor_count: u32::try_from(numbers.len().max(1)).expect("few bindings"),
+        };
+        let sizes = kinds.map(size);
         let pool_info = vk::DescriptorPoolCreateInfo::default().max_sets(1).pool_sizes(&sizes);
         // SAFETY: as above.
         self.pool = unsafe { raw.create_descriptor_pool(&pool_info, None) }
@@ -203,39 +219,39 @@ impl Pipeline {
 
     /// Panics unless `draw` is of the pipeline's device, for targets of its kind, and has what it reads.
     pub(super) fn check(&self, draw: &Draw<'_>) {
-        let devices = (draw.buffers.iter().map(|buffer| &buffer.gpu))
-            .chain(draw.textures.iter().map(|texture| &texture.gpu))
+        let devices = (draw.buffers.iter().map(|(_, buffer)| &buffer.gpu))
+            .chain(draw.textures.iter().map(|(_, texture)| texture.gpu()))
             .chain([&draw.target.gpu]);
         assert!(devices.into_iter().all(|gpu| Arc::ptr_eq(gpu, &self.gpu)), "objects of several devices");
         assert_eq!((draw.target.format, draw.target.images.len()), (self.format, self.attachments));
-        assert_eq!(
-            (draw.buffers.len(), draw.textures.len()),
-            (self.buffers as usize, self.textures as usize)
-        );
         assert_eq!(draw.push_constants.len(), self.push_constant_bytes as usize);
     }
 
-    pub(super) fn bind(&self, buffers: &[&Buffer], textures: &[&Texture3d]) {
-        let buffer_infos: Vec<[vk::DescriptorBufferInfo; 1]> = buffers
-            .iter()
-            .map(|buffer| [vk::DescriptorBufferInfo { buffer: buffer.raw, offset: 0, range: vk::WHOLE_SIZE }])
-            .collect();
-        let image_infos: Vec<[vk::DescriptorImageInfo; 1]> = textures
-            .iter()
-            .map(|texture| {
-                [vk::DescriptorImageInfo {
-                    sampler: texture.sampler,
-                    image_view: texture.image.view,
-                    image_layout: vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL,
-                }]
-            })
-            .collect();
-        let write = |binding| vk::WriteDescriptorSet::default().dst_set(self.set).dst_binding(binding);
+    /// Panics where a binding of the pipeline is not among those given.
+    pub(super) fn bind(&self, buffers: &[(u32, &Buffer)], textures: &[(u32, Sampled<'_>)]) {
+        let buffer_infos = self.buffers.iter().map(|&binding| {
+            let (_, buffer) =
+                buffers.iter().find(|(one, _)| *one == binding).expect("a buffer for each binding");
+            [vk::DescriptorBufferInfo { buffer: buffer.raw, offset: 0, range: vk::WHOLE_SIZE }]
+        });
+        let buffer_infos: Vec<_> = buffer_infos.collect();
+        let image_infos = self.textures.iter().map(|&binding| {
+            let (_, texture) =
+                textures.iter().find(|(one, _)| *one == binding).expect("a texture for each binding");
+            let (sampler, image_view) = texture.sampler_and_view();
+            [vk::DescriptorImageInfo {
+                sampler,
+                image_view,
+                image_layout: vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL,
+            }]
+        });
+        let image_infos: Vec<_> = image_infos.collect();
+        let write = |&binding: &u32| vk::WriteDescriptorSet::default().dst_set(self.set).dst_binding(binding);
         let mut writes = Vec::new();
-        for (binding, info) in (0..).zip(&buffer_infos) {
+        for (binding, info) in self.buffers.iter().zip(&buffer_infos) {
             writes.push(write(binding).descriptor_type(vk::DescriptorType::STORAGE_BUFFER).buffer_info(info));
         }
-        for (binding, info) in (self.buffers..).zip(&image_infos) {
+        for (binding, info) in self.textures.iter().zip(&image_infos) {
             writes.push(
                 write(binding).descriptor_type(vk::DescriptorType::COMBINED_IMAGE_SAMPLER).image_info(info),
             );

@@ -1,4 +1,4 @@
-//! The floating-point targets that pictures are blended in and read back from.
+//! The floating-point targets that pictures are drawn in, and read from: by the host, or by shaders.
 
 use std::cell::Cell;
 use std::marker::PhantomData;
@@ -12,13 +12,18 @@ use super::format::Rgba;
 use super::image::DeviceImage;
 use crate::{Error, Result};
 
-/// One or more floating-point RGBA images of one size, with a framebuffer over them and memory to read them back.
+/// One or more floating-point RGBA images of one size with a framebuffer over them, and who reads them.
 #[derive(Debug)]
 pub struct Target {
     pub(super) width: u32,
     pub(super) height: u32,
     pub(super) images: Vec<DeviceImage>,
+    /// That the nearest of several surfaces is kept by.
+    pub(super) depth: Option<DeviceImage>,
+    /// What the host reads; none for shaders.
     pub(super) readbacks: Vec<Buffer>,
+    /// What shaders read through; null for the host.
+    pub(super) sampler: vk::Sampler,
     /// Begins a picture.
     pub(super) clearing: vk::RenderPass,
     /// Goes on with one.
@@ -30,8 +35,11 @@ pub struct Target {
     not_shared: PhantomData<Cell<()>>,
 }
 
+/// Of surfaces.
+const DEPTH_FORMAT: vk::Format = vk::Format::D32_SFLOAT;
+
 impl Target {
-    /// `attachments` images of `width x height` pixels, in the most accurate format that the device blends.
+    /// `attachments` images of `width x height` pixels that the host reads, in the most accurate format that the device blends.
     ///
     /// # Errors
     /// [`Error::Usage`] where a side is 0; [`Error::Device`] where one is longer than the device allows;
@@ -40,55 +48,114 @@ impl Target {
     /// # Panics
     /// Where there are no attachments, or more than the device draws into at once.
     pub fn new(gpu: &Arc<Gpu>, width: u32, height: u32, attachments: usize) -> Result<Self> {
-        let (format, bytes) = Self::check(gpu, width, height, attachments)?;
-        assert!((1..=gpu.limits.max_color_attachments as usize).contains(&attachments));
-
-        let info = vk::ImageCreateInfo::default()
-            .image_type(vk::ImageType::TYPE_2D)
-            .format(format.raw())
-            .extent(vk::Extent3D { width, height, depth: 1 })
-            .mip_levels(1)
-            .array_layers(1)
-            .samples(vk::SampleCountFlags::TYPE_1)
-            .tiling(vk::ImageTiling::OPTIMAL)
-            .usage(vk::ImageUsageFlags::COLOR_ATTACHMENT | vk::ImageUsageFlags::TRANSFER_SRC);
-        let images: Vec<DeviceImage> = (0..attachments)
-            .map(|_| DeviceImage::new(gpu, "the picture", &info, vk::ImageViewType::TYPE_2D))
-            .collect::<Result<_>>()?;
-        let readbacks =
+        let (_, bytes) = Self::check(gpu, "the picture", [width, height], attachments)?;
+        let mut target = Self::empty(gpu, "the picture", [width, height], attachments)?;
+        target.readbacks =
             (0..attachments).map(|_| Buffer::readback(gpu, "the picture", bytes)).collect::<Result<_>>()?;
+        target.finish()
+    }
+
+    /// The same for shaders, which read it texel by texel; `nearest` keeps of several surfaces the nearest.
+    ///
+    /// # Errors
+    /// As [`Target::new`], and [`Error::Device`] where the device has no such format.
+    ///
+    /// # Panics
+    /// As [`Target::new`].
+    pub fn sampled(
+        gpu: &Arc<Gpu>,
+        name: &'static str,
+        [width, height]: [u32; 2],
+        attachments: usize,
+        nearest: bool,
+    ) -> Result<Self> {
+        Self::check(gpu, name, [width, height], attachments)?;
+        let mut target = Self::empty(gpu, name, [width, height], attachments)?;
+        if nearest {
+            let features = vk::FormatFeatureFlags::DEPTH_STENCIL_ATTACHMENT;
+            if !gpu.supports(DEPTH_FORMAT, features) {
+                let message = format!("{} has no depth buffer of 32 bits", gpu.info().name);
+                return Err(Error::Device { message, help: None });
+            }
+            let usage = vk::ImageUsageFlags::DEPTH_STENCIL_ATTACHMENT;
+            let info = image_info(DEPTH_FORMAT, width, height, usage);
+            let aspect = vk::ImageAspectFlags::DEPTH;
+            target.depth = Some(DeviceImage::new(gpu, name, &info, vk::ImageViewType::TYPE_2D, aspect)?);
+        }
+        let clamp = vk::SamplerAddressMode::CLAMP_TO_EDGE;
+        let sampler_info = vk::SamplerCreateInfo::default().address_mode_u(clamp).address_mode_v(clamp);
+        // SAFETY: a plain sampler of a device that outlives it.
+        target.sampler = unsafe { gpu.raw.create_sampler(&sampler_info, None) }
+            .map_err(|error| vulkan_error("creating a sampler", error))?;
+        target.finish()
+    }
+
+    /// Images, but nothing that draws or reads.
+    fn empty(
+        gpu: &Arc<Gpu>,
+        name: &'static str,
+        [width, height]: [u32; 2],
+        attachments: usize,
+    ) -> Result<Self> {
+        let (format, _) = Self::check(gpu, name, [width, height], attachments)?;
+        assert!((1..=gpu.limits.max_color_attachments as usize).contains(&attachments));
+        let usage = vk::ImageUsageFlags::COLOR_ATTACHMENT
+            | vk::ImageUsageFlags::TRANSFER_SRC
+            | vk::ImageUsageFlags::SAMPLED;
+        let info = image_info(format.raw(), width, height, usage);
+        let aspect = vk::ImageAspectFlags::COLOR;
+        let images: Vec<DeviceImage> = (0..attachments)
+            .map(|_| DeviceImage::new(gpu, name, &info, vk::ImageViewType::TYPE_2D, aspect))
+            .collect::<Result<_>>()?;
         // From here on `Drop` cleans up, null handles included.
-        let mut target = Self {
+        Ok(Self {
             width,
             height,
             images,
-            readbacks,
+            depth: None,
+            readbacks: Vec::new(),
+            sampler: vk::Sampler::null(),
             clearing: vk::RenderPass::null(),
             continuing: vk::RenderPass::null(),
             framebuffer: vk::Framebuffer::null(),
             format,
             gpu: gpu.clone(),
             not_shared: PhantomData,
-        };
-        target.clearing = render_pass(gpu, format, attachments, true)?;
-        target.continuing = render_pass(gpu, format, attachments, false)?;
-        let views: Vec<vk::ImageView> = target.images.iter().map(|image| image.view).collect();
+        })
+    }
+
+    /// Makes what draws.
+    fn finish(mut self) -> Result<Self> {
+        self.clearing = render_pass(&self, true)?;
+        self.continuing = render_pass(&self, false)?;
+        let views: Vec<vk::ImageView> =
+            self.images.iter().chain(&self.depth).map(|image| image.view).collect();
         let framebuffer_info = vk::FramebufferCreateInfo::default()
-            .render_pass(target.clearing)
+            .render_pass(self.clearing)
             .attachments(&views)
-            .width(width)
-            .height(height)
+            .width(self.width)
+            .height(self.height)
             .layers(1);
         // SAFETY: the views are of this device, of the render pass's formats, and of this size.
-        target.framebuffer = unsafe { gpu.raw.create_framebuffer(&framebuffer_info, None) }
+        self.framebuffer = unsafe { self.gpu.raw.create_framebuffer(&framebuffer_info, None) }
             .map_err(|error| vulkan_error("creating the framebuffer", error))?;
-        Ok(target)
+        Ok(self)
+    }
+
+    /// The size in pixels.
+    pub fn size(&self) -> [u32; 2] {
+        [self.width, self.height]
     }
 
     /// Whether the device can hold such a target: in which format, and of how many bytes an image.
-    pub(super) fn check(gpu: &Gpu, width: u32, height: u32, attachments: usize) -> Result<(Rgba, u64)> {
+    pub(super) fn check(
+        gpu: &Gpu,
+        name: &str,
+        [width, height]: [u32; 2],
+        attachments: usize,
+    ) -> Result<(Rgba, u64)> {
         if width.min(height) == 0 {
-            let message = format!("a picture of {width} x {height} pixels");
+            let message = format!("{name}: {width} x {height} pixels");
             return Err(Error::Usage { message, help: Some("ask for at least one pixel a side".into()) });
         }
         let limits = &gpu.limits;
@@ -99,77 +166,129 @@ impl Target {
         if width.max(height) > limit {
             return Err(Error::Device {
                 message: format!(
-                    "a picture of {width} x {height} pixels; {} draws at most {limit} a side",
+                    "{name}: {width} x {height} pixels; {} draws at most {limit} a side",
                     gpu.info().name
                 ),
                 help: Some("ask for a smaller picture".into()),
             });
         }
-        let features = vk::FormatFeatureFlags::COLOR_ATTACHMENT_BLEND | vk::FormatFeatureFlags::TRANSFER_SRC;
+        let features = vk::FormatFeatureFlags::COLOR_ATTACHMENT_BLEND
+            | vk::FormatFeatureFlags::TRANSFER_SRC
+            | vk::FormatFeatureFlags::SAMPLED_IMAGE;
         let format = Rgba::best(gpu, features).ok_or_else(|| Error::Device {
             message: format!("{} blends into no floating-point target", gpu.info().name),
             help: None,
         })?;
         let bytes = u64::from(width) * u64::from(height) * format.bytes();
-        gpu.check_memory("the picture", 2 * bytes * attachments as u64)?;
+        gpu.check_memory(name, 2 * bytes * attachments as u64)?;
         Ok((format, bytes))
     }
 
     /// The pixels of one image as of the last draw, row by row from the top left.
+    ///
+    /// # Panics
+    /// Where the target is for shaders.
     pub fn read(&self, attachment: usize) -> Vec<[f32; 4]> {
         self.format.decode(self.readbacks[attachment].read())
     }
 }
 
-/// Clears to zero or keeps what is there, draws, and leaves the images ready to be copied. Both kinds are compatible in Vulkan's
-/// sense: one framebuffer and one pipeline serve both.
-fn render_pass(gpu: &Gpu, format: Rgba, attachments: usize, clears: bool) -> Result<vk::RenderPass> {
-    let (load, layout) = match clears {
-        true => (vk::AttachmentLoadOp::CLEAR, vk::ImageLayout::UNDEFINED),
-        false => (vk::AttachmentLoadOp::LOAD, vk::ImageLayout::TRANSFER_SRC_OPTIMAL),
+fn image_info(
+    format: vk::Format,
+    width: u32,
+    height: u32,
+    usage: vk::ImageUsageFlags,
+) -> vk::ImageCreateInfo<'static> {
+    vk::ImageCreateInfo::default()
+        .image_type(vk::ImageType::TYPE_2D)
+        .format(format)
+        .extent(vk::Extent3D { width, height, depth: 1 })
+        .mip_levels(1)
+        .array_layers(1)
+        .samples(vk::SampleCountFlags::TYPE_1)
+        .tiling(vk::ImageTiling::OPTIMAL)
+        .usage(usage)
+}
+
+/// Clears to zero or keeps what is there, draws, and leaves the images ready for who reads them. Both kinds are compatible in
+/// Vulkan's sense: one framebuffer and one pipeline serve both.
+fn render_pass(target: &Target, clears: bool) -> Result<vk::RenderPass> {
+    let gpu = &target.gpu;
+    let is_sampled = target.sampler != vk::Sampler::null();
+    // Who reads what was drawn, before and after.
+    let (read_layout, reads, read_stage) = if is_sampled {
+        (
+            vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL,
+            vk::AccessFlags::SHADER_READ,
+            vk::PipelineStageFlags::FRAGMENT_SHADER,
+        )
+    } else {
+        (
+            vk::ImageLayout::TRANSFER_SRC_OPTIMAL,
+            vk::AccessFlags::TRANSFER_READ,
+            vk::PipelineStageFlags::TRANSFER,
+        )
     };
-    let descriptions = vec![
+    let description = |format, kept| {
+        let (load, layout) = match clears {
+            true => (vk::AttachmentLoadOp::CLEAR, vk::ImageLayout::UNDEFINED),
+            false => (vk::AttachmentLoadOp::LOAD, kept),
+        };
         vk::AttachmentDescription::default()
-            .format(format.raw())
+            .format(format)
             .samples(vk::SampleCountFlags::TYPE_1)
             .load_op(load)
             .store_op(vk::AttachmentStoreOp::STORE)
             .stencil_load_op(vk::AttachmentLoadOp::DONT_CARE)
             .stencil_store_op(vk::AttachmentStoreOp::DONT_CARE)
             .initial_layout(layout)
-            .final_layout(vk::ImageLayout::TRANSFER_SRC_OPTIMAL);
-        attachments
-    ];
-    let references: Vec<vk::AttachmentReference> = (0..attachments)
-        .map(|index| vk::AttachmentReference {
-            attachment: u32::try_from(index).expect("few attachments"),
+            .final_layout(kept)
+    };
+    let mut descriptions = vec![description(target.format.raw(), read_layout); target.images.len()];
+    let depth_layout = vk::ImageLayout::DEPTH_STENCIL_ATTACHMENT_OPTIMAL;
+    if target.depth.is_some() {
+        descriptions.push(description(DEPTH_FORMAT, depth_layout));
+    }
+    let count = u32::try_from(target.images.len()).expect("few attachments");
+    let references: Vec<vk::AttachmentReference> = (0..count)
+        .map(|attachment| vk::AttachmentReference {
+            attachment,
             layout: vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL,
         })
         .collect();
-    let subpass = vk::SubpassDescription::default()
+    let depth_reference = vk::AttachmentReference { attachment: count, layout: depth_layout };
+    let mut subpass = vk::SubpassDescription::default()
         .pipeline_bind_point(vk::PipelineBindPoint::GRAPHICS)
         .color_attachments(&references);
+    let (mut stages, mut writes, mut accesses) = (
+        vk::PipelineStageFlags::COLOR_ATTACHMENT_OUTPUT,
+        vk::AccessFlags::COLOR_ATTACHMENT_WRITE,
+        vk::AccessFlags::COLOR_ATTACHMENT_WRITE | vk::AccessFlags::COLOR_ATTACHMENT_READ,
+    );
+    if target.depth.is_some() {
+        subpass = subpass.depth_stencil_attachment(&depth_reference);
+        stages |= vk::PipelineStageFlags::EARLY_FRAGMENT_TESTS | vk::PipelineStageFlags::LATE_FRAGMENT_TESTS;
+        writes |= vk::AccessFlags::DEPTH_STENCIL_ATTACHMENT_WRITE;
+        accesses |=
+            vk::AccessFlags::DEPTH_STENCIL_ATTACHMENT_WRITE | vk::AccessFlags::DEPTH_STENCIL_ATTACHMENT_READ;
+    }
     let dependencies = [
-        // The clear waits for the copy of the frame before, what goes on for what was drawn before.
+        // The clear waits for the reads of the frame before, what goes on for what was drawn before.
         vk::SubpassDependency::default()
             .src_subpass(vk::SUBPASS_EXTERNAL)
             .dst_subpass(0)
-            .src_stage_mask(
-                vk::PipelineStageFlags::TRANSFER | vk::PipelineStageFlags::COLOR_ATTACHMENT_OUTPUT,
-            )
-            .src_access_mask(vk::AccessFlags::COLOR_ATTACHMENT_WRITE)
-            .dst_stage_mask(vk::PipelineStageFlags::COLOR_ATTACHMENT_OUTPUT)
-            .dst_access_mask(
-                vk::AccessFlags::COLOR_ATTACHMENT_WRITE | vk::AccessFlags::COLOR_ATTACHMENT_READ,
-            ),
-        // The copy waits for the drawing.
+            .src_stage_mask(read_stage | stages)
+            .src_access_mask(writes)
+            .dst_stage_mask(stages)
+            .dst_access_mask(accesses),
+        // Who reads waits for the drawing.
         vk::SubpassDependency::default()
             .src_subpass(0)
             .dst_subpass(vk::SUBPASS_EXTERNAL)
-            .src_stage_mask(vk::PipelineStageFlags::COLOR_ATTACHMENT_OUTPUT)
-            .src_access_mask(vk::AccessFlags::COLOR_ATTACHMENT_WRITE)
-            .dst_stage_mask(vk::PipelineStageFlags::TRANSFER)
-            .dst_access_mask(vk::AccessFlags::TRANSFER_READ),
+            .src_stage_mask(stages)
+            .src_access_mask(writes)
+            .dst_stage_mask(read_stage)
+            .dst_access_mask(reads),
     ];
     let subpasses = [subpass];
     let info = vk::RenderPassCreateInfo::default()
@@ -185,6 +304,7 @@ impl Drop for Target {
     fn drop(&mut self) {
         // SAFETY: every submission that used them was waited for; null handles are allowed.
         unsafe {
+            self.gpu.raw.destroy_sampler(self.sampler, None);
             self.gpu.raw.destroy_framebuffer(self.framebuffer, None);
             self.gpu.raw.destroy_render_pass(self.clearing, None);
             self.gpu.raw.destroy_render_pass(self.continuing, None);

@@ -81,7 +81,8 @@ impl Texture3d {
             .samples(vk::SampleCountFlags::TYPE_1)
             .tiling(vk::ImageTiling::OPTIMAL)
             .usage(vk::ImageUsageFlags::SAMPLED | vk::ImageUsageFlags::TRANSFER_DST);
-        let image = DeviceImage::new(gpu, name, &info, vk::ImageViewType::TYPE_3D)?;
+        let colour = vk::ImageAspectFlags::COLOR;
+        let image = DeviceImage::new(gpu, name, &info, vk::ImageViewType::TYPE_3D, colour)?;
 
         let mut regions = Vec::new();
         let mut offset = 0;

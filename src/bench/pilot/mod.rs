@@ -114,9 +114,7 @@ fn fingerprint(scene: &Scene, method: &Entry, setup: &Setup<'_>) -> Result<Finge
     for text in [&of_reference, method.name, &device.name, &device.driver] {
         builder = builder.bytes(text.as_bytes());
     }
-    let unlit = [shaders::SHELL_VERT, shaders::SHELL_FRAG, shaders::CYCLE_VERT, shaders::CYCLE_FRAG];
-    let lit = [shaders::SHELL_LIT_VERT, shaders::SHELL_LIT_FRAG, shaders::CYCLE_LIT_FRAG];
-    for shader in unlit.iter().chain(&lit) {
+    for shader in shaders::ALL.iter().flat_map(|family| family.all()) {
         builder = builder.numbers(shader.words());
     }
     for code in METHOD_CODE {

@@ -7,6 +7,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::seen::Seen;
+use super::shadows::{LightPicture, Shadows};
 use crate::Result;
 use crate::gpu::{Buffer, Gpu, Texture3d};
 use crate::scene::{Light, Shading, Source, View};
@@ -29,7 +30,7 @@ pub struct LitCell {
     pub per_height: [f32; 4],
 }
 
-/// `Lighting` of `glsl/include/shade.glsl`, before its sources: see there for each member.
+/// `Lighting` of `glsl/include/lights.glsl`, before its sources: see there for each member.
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
 #[allow(missing_docs, reason = "documented at the one declaration in glsl")]
@@ -40,16 +41,20 @@ pub struct Lighting {
     pub specular: f32,
     pub shininess: f32,
     pub count: u32,
-    pub padding: u32,
+    pub glow: f32,
+    pub glow_from: f32,
+    pub padding: [u32; 3],
 }
 
-/// `LightSource` of `glsl/include/shade.glsl`: see there for each member.
+/// `LightSource` of `glsl/include/lights.glsl`: see there for each member.
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
 #[allow(missing_docs, reason = "documented at the one declaration in glsl")]
 pub struct LightSource {
     pub place: [f32; 4],
     pub colour: [f32; 4],
+    pub pictures: [u32; 2],
+    pub padding: [u32; 2],
 }
 
 /// What does not depend on the view.
@@ -68,6 +73,25 @@ pub struct LitView {
     pub cells: Buffer,
     /// [`Lighting`] and its [`LightSource`]s.
     pub lighting: Buffer,
+    /// [`LightPicture`]s, where a light casts shadows.
+    ///
+    /// [`LightPicture`]: super::shadows::LightPicture
+    pub pictures: Option<Buffer>,
+}
+
+/// What a lit scene is seen with, in one view.
+#[derive(Clone, Copy)]
+pub struct Sight<'a> {
+    /// See [`Shading`].
+    pub shading: &'a Shading,
+    /// What lights see, where one casts shadows.
+    pub shadows: Option<&'a Shadows>,
+    /// The scene's.
+    pub shell: &'a Shell,
+    /// The shell, as it is seen.
+    pub seen: &'a Seen,
+    /// From where.
+    pub view: &'a View,
 }
 
 impl Lit {
@@ -96,21 +120,17 @@ impl Lit {
 }
 
 impl LitView {
-    /// Uploads what `seen` was seen from `view`.
+    /// Uploads what is seen.
     ///
     /// # Errors
     /// As [`Lit::new`].
-    pub fn new(
-        gpu: &Arc<Gpu>,
-        lit: &Lit,
-        shading: &Shading,
-        shell: &Shell,
-        seen: &Seen,
-        view: &View,
-    ) -> Result<Self> {
+    pub fn new(gpu: &Arc<Gpu>, lit: &Lit, sight: Sight<'_>) -> Result<Self> {
+        let pictures = sight.pictures();
+        let pictures = pictures.map(|pictures| Buffer::storage(gpu, "the lights' pictures", &pictures));
         Ok(Self {
-            cells: Buffer::storage(gpu, "the tetrahedra's frames", &lit.cells(shell, seen))?,
-            lighting: Buffer::storage(gpu, "the lights", &lighting(shading, view, seen.unit))?,
+            cells: Buffer::storage(gpu, "the tetrahedra's frames", &lit.cells(sight.shell, sight.seen))?,
+            lighting: Buffer::storage(gpu, "the lights", &sight.lighting())?,
+            pictures: pictures.transpose()?,
         })
     }
 
@@ -118,48 +138,59 @@ impl LitView {
     ///
     /// # Errors
     /// As [`Lit::new`].
-    pub fn refill(
-        &mut self,
-        lit: &Lit,
-        shading: &Shading,
-        shell: &Shell,
-        seen: &Seen,
-        view: &View,
-    ) -> Result<()> {
-        self.cells.refill(&lit.cells(shell, seen))?;
-        self.lighting.refill(&lighting(shading, view, seen.unit))
+    pub fn refill(&mut self, lit: &Lit, sight: Sight<'_>) -> Result<()> {
+        self.cells.refill(&lit.cells(sight.shell, sight.seen))?;
+        if let (Some(buffer), Some(pictures)) = (&mut self.pictures, sight.pictures()) {
+            buffer.refill(&pictures)?;
+        }
+        self.lighting.refill(&sight.lighting())
+    }
+
+    /// By the binding that shaders name: what all lit shaders read.
+    pub fn lights(&self) -> Vec<(u32, &Buffer)> {
+        [(5, &self.lighting)].into_iter().chain(self.pictures.iter().map(|pictures| (6, pictures))).collect()
     }
 }
 
-/// [`Lighting`] and its sources, as bytes. `unit`: see [`Seen::unit`].
-fn lighting(shading: &Shading, view: &View, unit: f64) -> Vec<u8> {
-    let frame = view.camera.frame();
-    let lighting = Lighting {
-        world_from_view: [frame.right, frame.up, frame.forward]
-            .map(|axis| axis.as_vec3().extend(0.0).to_array()),
-        ambient: shading.ambient.as_vec3().to_array(),
-        diffuse: shading.diffuse as f32,
-        specular: shading.specular as f32,
-        shininess: shading.shininess as f32,
-        count: shading.lights.len() as u32,
-        padding: 0,
-    };
-    let source = |&Light { source, colour, .. }: &Light| {
-        let colour = colour.as_vec3();
-        match source {
-            Source::Directional { towards } => {
-                LightSource { place: towards.as_vec3().extend(0.0).into(), colour: colour.extend(0.0).into() }
-            }
-            Source::Point { position, falloff } => {
-                let place = (position - view.camera.eye) / unit;
-                let per_falloff = falloff.map_or(0.0, |falloff| unit / falloff);
-                LightSource {
-                    place: place.as_vec3().extend(per_falloff as f32).into(),
-                    colour: colour.extend(1.0).into(),
+impl Sight<'_> {
+    fn pictures(&self) -> Option<Vec<LightPicture>> {
+        self.shadows.map(|shadows| shadows.seen_from(self.view.camera.eye, self.seen.unit))
+    }
+
+    /// [`Lighting`] and its sources, as bytes.
+    fn lighting(&self) -> Vec<u8> {
+        let Self { shading, view, seen: Seen { unit, .. }, .. } = self;
+        let frame = view.camera.frame();
+        let lighting = Lighting {
+            world_from_view: [frame.right, frame.up, frame.forward]
+                .map(|axis| axis.as_vec3().extend(0.0).to_array()),
+            ambient: shading.ambient.as_vec3().to_array(),
+            diffuse: shading.diffuse as f32,
+            specular: shading.specular as f32,
+            shininess: shading.shininess as f32,
+            count: shading.lights.len() as u32,
+            glow: shading.emission.glow as f32,
+            glow_from: shading.emission.from as f32,
+            padding: [0; 3],
+        };
+        let source = |(index, light): (usize, &Light)| {
+            let colour = light.colour.as_vec3();
+            let (place, kind) = match light.source {
+                Source::Directional { towards } => (towards.as_vec3().extend(0.0), 0.0),
+                Source::Point { position, falloff } => {
+                    let place = (position - view.camera.eye) / *unit;
+                    let per_falloff = falloff.map_or(0.0, |falloff| unit / falloff);
+                    (place.as_vec3().extend(per_falloff as f32), 1.0)
                 }
+            };
+            LightSource {
+                place: place.into(),
+                colour: colour.extend(kind).into(),
+                pictures: self.shadows.map_or([0; 2], |shadows| shadows.pictures_of(index)),
+                padding: [0; 2],
             }
-        }
-    };
-    let sources: Vec<LightSource> = shading.lights.iter().map(source).collect();
-    [bytemuck::bytes_of(&lighting), bytemuck::cast_slice(&sources)].concat()
+        };
+        let sources: Vec<LightSource> = shading.lights.iter().enumerate().map(source).collect();
+        [bytemuck::bytes_of(&lighting), bytemuck::cast_slice(&sources)].concat()
+    }
 }

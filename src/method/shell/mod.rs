@@ -1,7 +1,7 @@
 //! The `shell` method: sorted tetrahedra, rasterised and marched (Dufort, Leblanc, Poulin 2005).
 //!
-//! A frame runs top to bottom in `Shell::render`: order, see (what depends on the eye), upload, march, read
-//! back. Deviations from the paper, and why: entry and exit are computed exactly per pixel within conservative outlines
+//! A frame runs top to bottom in `Shell::render`: order, see (what depends on the eye), shadows (once), upload, solids, march,
+//! read back. Deviations from the paper, and why: entry and exit are computed exactly per pixel within conservative outlines
 //! ([`outline`], `glsl/shell.frag.glsl`), because interpolated ones inherit the rasteriser's snapping; an eye inside the
 //! shell is then no special case; tetrahedra are drawn front to back into a floating-point target; and those that hide one
 //! another in a cycle, or overlap, are resolved per pixel (`glsl/cycle.frag.glsl`), where they are too many on the host
@@ -11,20 +11,26 @@ mod left;
 pub mod lit;
 pub mod outline;
 pub mod seen;
+pub mod shadows;
+pub mod solids;
 
 use std::sync::Arc;
 
 use bytemuck::{Pod, Zeroable};
 
-use self::lit::{Lit, LitView};
+use self::lit::{Lit, LitView, Sight};
 use self::seen::{Run, Seen};
+use self::shadows::Shadows;
+use self::solids::{SolidView, Solids};
 use super::{Method, Setup};
 use crate::frame::{Frame, Image, Report, Stopwatch};
-use crate::gpu::{Batch, Buffer, Draw, Gpu, Pipeline, PipelineInfo, Target, Texture3d, draw, shaders};
+use crate::gpu::{
+    Batch, Buffer, Draw, Gpu, Keeps, Pipeline, PipelineInfo, Sampled, Target, Texture3d, draw, shaders,
+};
 use crate::order::{Sorted, Sorter};
 use crate::progress::{Interrupt, Progress};
 use crate::scene::{March, Model, Scene, Sizes, View, span};
-use crate::volume::Quantity;
+use crate::volume::{Pyramid, Quantity};
 use crate::{Error, Result};
 
 /// The push constants of `glsl/include/shell.glsl`: see there for each member.
@@ -53,6 +59,10 @@ struct Shell {
     volume: Texture3d,
     /// In a lit scene.
     lit: Option<Lit>,
+    /// Once they were needed, and if a light casts any.
+    shadows: Option<Option<Shadows>>,
+    /// Where there are any.
+    solids: Option<Solids>,
     /// The most that a ray passes in one tetrahedron.
     texels: f64,
     // What a frame of one size and kind needs, kept for the next frame.
@@ -71,14 +81,17 @@ struct Canvas {
     members: Buffer,
     /// In a lit scene.
     lit: Option<LitView>,
+    /// Where there are solids: their picture, and what lays it behind the medium.
+    solids: Option<(SolidView, Pipeline)>,
 }
 
 impl Canvas {
-    /// At the bindings that the shaders name.
-    fn buffers<'a>(&'a self, lit: Option<&'a Lit>) -> Vec<&'a Buffer> {
-        let mut buffers = vec![&self.cells, &self.tiles, &self.members];
+    /// By the binding that shaders name.
+    fn buffers<'a>(&'a self, lit: Option<&'a Lit>) -> Vec<(u32, &'a Buffer)> {
+        let mut buffers = vec![(0, &self.cells), (1, &self.tiles), (2, &self.members)];
         if let (Some(lit), Some(view)) = (lit, &self.lit) {
-            buffers.extend([&view.cells, &lit.frames, &view.lighting]);
+            buffers.extend([(3, &view.cells), (4, &lit.frames)]);
+            buffers.extend(view.lights());
         }
         buffers
     }
@@ -135,8 +148,21 @@ impl super::Opened for Opened {
         progress.stage("uploading the volume");
         let volume = Texture3d::upload(&gpu, "the volume", &scene.volume)?;
         let lit = scene.shading.as_ref().map(|shading| Lit::new(&gpu, &scene.shell, shading)).transpose()?;
+        let solids = Solids::new(&gpu, &scene.solids)?;
         let sorter = Sorter::new(&scene.shell.topology);
-        Ok(Box::new(Shell { scene, gpu, progress, interrupt, sorter, volume, lit, texels, canvas: None }))
+        Ok(Box::new(Shell {
+            scene,
+            gpu,
+            progress,
+            interrupt,
+            sorter,
+            volume,
+            lit,
+            shadows: None,
+            solids,
+            texels,
+            canvas: None,
+        }))
     }
 }
 
@@ -155,6 +181,13 @@ impl Method for Shell {
         self.progress.stage("mapping the view");
         let seen = Seen::new(&self.scene, &sorted, view, self.gpu.subpixels());
         watch.lap("see");
+        let keeps_shadows = self.shadows.is_some();
+        if !keeps_shadows {
+            let shadows =
+                Shadows::draw(&self.gpu, &self.scene, &self.volume, &*self.progress, &self.interrupt)?;
+            self.shadows = Some(shadows);
+            watch.lap("shadows");
+        }
         self.progress.stage("uploading the view");
         let kind = CanvasKind {
             width: view.width,
@@ -168,16 +201,42 @@ impl Method for Shell {
         let canvas = &*self.canvas.insert(canvas);
         watch.lap("upload");
 
+        let constants = constants(&self.scene, view, seen.unit);
+        let shadows = self.shadows.iter().flatten().next();
+        let shadow_textures = shadows.map_or_else(Vec::new, Shadows::textures);
+        if let (Some(solids), Some((solid_view, _))) = (&self.solids, &canvas.solids) {
+            self.interrupt.check()?;
+            self.progress.stage("drawing the solids");
+            solid_view.draw(
+                &self.gpu,
+                &self.scene,
+                solids,
+                view,
+                seen.unit,
+                &constants,
+                &canvas.lit.as_ref().map_or_else(Vec::new, LitView::lights),
+                &shadow_textures,
+                shadows.map_or(0.0, Shadows::widest_pixel),
+                &self.interrupt,
+            )?;
+            watch.lap("solids");
+        }
         self.interrupt.check()?;
         self.progress.stage("marching");
-        let textures: Vec<&Texture3d> =
-            [&self.volume].into_iter().chain(self.lit.as_ref().map(|lit| &lit.directions)).collect();
-        let batches: Vec<Batch<'_>> = seen.runs.iter().map(|run| canvas.batch(run)).collect();
+        let mut textures = vec![(8, Sampled::Texture(&self.volume))];
+        textures.extend(self.lit.as_ref().map(|lit| (9, Sampled::Texture(&lit.directions))));
+        textures.extend(shadow_textures);
+        let mut batches: Vec<Batch<'_>> = seen.runs.iter().map(|run| canvas.batch(run)).collect();
+        if let Some((solids, layer)) = &canvas.solids {
+            textures.extend(solids.textures());
+            batches.push(Batch { pipeline: layer, vertices: 0..3 });
+        }
         let times = draw(&Draw {
             target: &canvas.target,
+            clears: true,
             buffers: &canvas.buffers(self.lit.as_ref()),
             textures: &textures,
-            push_constants: bytemuck::bytes_of(&constants(&self.scene, view, seen.unit)),
+            push_constants: bytemuck::bytes_of(&constants),
             batches: &batches,
             between: &|done| {
                 self.progress.fraction(done);
@@ -209,6 +268,9 @@ impl Method for Shell {
         )?;
         watch.lap("left");
         let mut report = self.report(&sorted, &seen, &rgba);
+        if keeps_shadows && shadows.is_some() {
+            report.skipped.push("shadows are kept: they do not depend on the camera".into());
+        }
         report.counts.insert("pixels_left_to_host".to_owned(), left);
         report.stages = watch.finish();
         Ok(Frame { image: Image { width: view.width, height: view.height, rgba }, depth, report })
@@ -224,55 +286,96 @@ impl Shell {
         canvas.cells.refill(&seen.cells)?;
         canvas.tiles.refill(&seen.tiles)?;
         canvas.members.refill(&seen.members)?;
-        if let (Some(lit), Some(kept), Some(shading)) = (&self.lit, &mut canvas.lit, &self.scene.shading) {
-            kept.refill(lit, shading, &self.scene.shell, seen, view)?;
+        if let (Some(lit), Some(kept), Some(sight)) = (&self.lit, &mut canvas.lit, self.sight(seen, view)) {
+            kept.refill(lit, sight)?;
         }
         Ok(canvas)
     }
 
+    /// In a lit scene.
+    fn sight<'a>(&'a self, seen: &'a Seen, view: &'a View) -> Option<Sight<'a>> {
+        let shadows = self.shadows.iter().flatten().next();
+        let shading = self.scene.shading.as_ref()?;
+        Some(Sight { shading, shadows, shell: &self.scene.shell, seen, view })
+    }
+
+    /// What is compiled into the shaders: what the scene has, and what is asked for.
+    fn switches(&self, kind: CanvasKind) -> Vec<&'static str> {
+        let has_shadows = self.shadows.iter().flatten().next().is_some();
+        let switches = [
+            ("DEPTH", kind.depth),
+            ("SOLIDS", self.solids.is_some()),
+            ("LIT", self.lit.is_some()),
+            ("SHADOWS", has_shadows),
+        ];
+        switches.into_iter().filter_map(|(name, is_on)| is_on.then_some(name)).collect()
+    }
+
     fn new_canvas(&self, kind: CanvasKind, seen: &Seen, view: &View) -> Result<Canvas> {
         let target = Target::new(&self.gpu, kind.width, kind.height, if kind.depth { 2 } else { 1 })?;
-        let mut constants = vec![
-            plan(self.scene.march),
-            u32::from(kind.minified),
-            u32::from(self.scene.volume.levels[0].quantity == Quantity::Extinction),
-        ];
-        let shading = self.scene.shading.as_ref();
-        constants.extend(shading.map(|shading| u32::from(shading.model == Model::Fibre)));
-        let is_lit = shading.is_some();
-        let pipeline = |vertex, fragment| {
-            let info = PipelineInfo {
-                vertex,
-                fragment,
-                constants: &constants,
-                storage_buffers: if is_lit { 6 } else { 3 },
-                textures: if is_lit { 2 } else { 1 },
-                push_constant_bytes: size_of::<ViewConstants>() as u32,
+        let on = self.switches(kind);
+        let mut constants = constants_of_volume(self.scene.march, kind.minified, &self.scene.volume).to_vec();
+        if let Some(shading) = &self.scene.shading {
+            constants.extend([shading.model == Model::Fibre, shading.emission.glow > 0.0].map(u32::from));
+        }
+        let mut buffers = vec![0, 1, 2];
+        let mut textures = vec![8];
+        for &switch in &on {
+            let (more_buffers, more_textures): (&[u32], &[u32]) = match switch {
+                "LIT" => (&[3, 4, 5], &[9]),
+                "SHADOWS" => (&[6], &[10, 11, 12, 13]),
+                "SOLIDS" => (&[], &[15]),
+                _ => (&[], &[]),
             };
-            Pipeline::new(&self.gpu, &target, &info)
+            buffers.extend(more_buffers);
+            textures.extend(more_textures);
+        }
+        if on.contains(&"SHADOWS") && on.contains(&"SOLIDS") {
+            textures.push(14);
+        }
+        let info = PipelineInfo {
+            vertex: shaders::SHELL_VERT.with(&on),
+            fragment: shaders::SHELL_FRAG.with(&on),
+            constants: &constants,
+            storage_buffers: &buffers,
+            textures: &textures,
+            push_constant_bytes: size_of::<ViewConstants>() as u32,
+            keeps: Keeps::Blend,
         };
-        let [outline, sorted, cycle] = match (is_lit, kind.depth) {
-            (false, false) => [shaders::SHELL_VERT, shaders::SHELL_FRAG, shaders::CYCLE_FRAG],
-            (false, true) => [shaders::SHELL_VERT, shaders::SHELL_DEPTH_FRAG, shaders::CYCLE_DEPTH_FRAG],
-            (true, false) => [shaders::SHELL_LIT_VERT, shaders::SHELL_LIT_FRAG, shaders::CYCLE_LIT_FRAG],
-            (true, true) => {
-                [shaders::SHELL_LIT_VERT, shaders::SHELL_LIT_DEPTH_FRAG, shaders::CYCLE_LIT_DEPTH_FRAG]
-            }
+        let sorted = Pipeline::new(&self.gpu, &target, &info)?;
+        let of_cycles = PipelineInfo {
+            vertex: shaders::TILE_VERT.with(&on),
+            fragment: shaders::CYCLE_FRAG.with(&on),
+            ..info
         };
-        let lit = match (&self.lit, shading) {
-            (Some(lit), Some(shading)) => {
-                Some(LitView::new(&self.gpu, lit, shading, &self.scene.shell, seen, view)?)
-            }
+        let cycle = kind.cycles.then(|| Pipeline::new(&self.gpu, &target, &of_cycles)).transpose()?;
+        let solids = self.solids.as_ref().map(|_| {
+            let layer = PipelineInfo {
+                vertex: shaders::LAYER_VERT.with(&on),
+                fragment: shaders::LAYER_FRAG.with(&on),
+                constants: &[],
+                storage_buffers: &[],
+                textures: &[15, 16],
+                ..info
+            };
+            Ok::<_, Error>((
+                SolidView::new(&self.gpu, view, &on)?,
+                Pipeline::new(&self.gpu, &target, &layer)?,
+            ))
+        });
+        let lit = match (&self.lit, self.sight(seen, view)) {
+            (Some(lit), Some(sight)) => Some(LitView::new(&self.gpu, lit, sight)?),
             _ => None,
         };
         Ok(Canvas {
             kind,
-            sorted: pipeline(outline, sorted)?,
-            cycle: kind.cycles.then(|| pipeline(shaders::CYCLE_VERT, cycle)).transpose()?,
+            sorted,
+            cycle,
             cells: Buffer::storage(&self.gpu, "the tetrahedra in order", &seen.cells)?,
             tiles: Buffer::storage(&self.gpu, "the tiles of cycles", &seen.tiles)?,
             members: Buffer::storage(&self.gpu, "the members of cycles", &seen.members)?,
             lit,
+            solids: solids.transpose()?,
             target,
         })
     }
@@ -289,6 +392,13 @@ impl Shell {
         count("cycles", sorted.order.cycles.len() as u64);
         count("tetrahedra_in_cycles", sorted.cycle_members);
         count("pixels_covered", rgba.iter().filter(|pixel| pixel[3] > 0.0).count() as u64);
+        let triangles = self.scene.solids.iter().map(|solid| solid.mesh.triangles.len() as u64).sum::<u64>();
+        if triangles > 0 {
+            count("solid_triangles", triangles);
+        }
+        if let Some(shadows) = self.shadows.iter().flatten().next() {
+            count("shadow_pictures", shadows.pictures() as u64);
+        }
         if seen.before_near > 0 {
             report.skipped.push(format!("{} tetrahedra lie before the near plane", seen.before_near));
         }
@@ -305,6 +415,13 @@ impl Shell {
         }
         if !seen.minified {
             report.skipped.push("all is magnified: no level of detail but 0 is compiled in".into());
+        }
+        match (&self.scene.shading, &self.shadows) {
+            (None, _) => report.skipped.push("the scene is unlit: nothing of light is compiled in".into()),
+            (_, Some(None)) => {
+                report.skipped.push("no light casts shadows: nothing of them is compiled in".into());
+            }
+            _ => {}
         }
         if health.inverted > 0 {
             report.warnings.push(format!(
@@ -350,6 +467,23 @@ fn plan(march: March) -> u32 {
     }
 }
 
+/// The specialisation constants of `glsl/include/sample.glsl`.
+fn constants_of_volume(march: March, minified: bool, volume: &Pyramid) -> [u32; 3] {
+    let is_extinction = volume.levels[0].quantity == Quantity::Extinction;
+    [plan(march), u32::from(minified), u32::from(is_extinction)]
+}
+
+impl ViewConstants {
+    /// What is known of a volume, and nothing else.
+    fn of_volume(volume: &Pyramid) -> Self {
+        Self {
+            texels: volume.levels[0].size.map(|side| side as f32),
+            last_level: (volume.levels.len() - 1) as f32,
+            ..Self::zeroed()
+        }
+    }
+}
+
 /// `unit`: see [`Seen::unit`].
 fn constants(scene: &Scene, view: &View, unit: f64) -> ViewConstants {
     let pixel = view.pixel_at_unit_depth();
@@ -363,12 +497,11 @@ fn constants(scene: &Scene, view: &View, unit: f64) -> ViewConstants {
         centre: [0.5 * view.width as f32, 0.5 * view.height as f32],
         pixel: pixel as f32,
         near: (view.camera.near / unit) as f32,
-        texels: scene.volume.levels[0].size.map(|side| side as f32),
-        last_level: (scene.volume.levels.len() - 1) as f32,
         lod_scale: (scene.medium.lod_footprint * pixel) as f32,
         per_opacity_distance: (unit / scene.medium.opacity_distance) as f32,
         step: step as f32,
         samples,
+        ..ViewConstants::of_volume(&scene.volume)
     }
 }
 

@@ -30,7 +30,8 @@ pub struct Cell {
 pub struct Tile {
     pub bounds: [f32; 4],
     pub members: [u32; 2],
-    pub padding: [u32; 2],
+    pub picture: u32,
+    pub padding: u32,
 }
 
 /// The side of a [`Tile`] in pixels: small enough that few members of a large cycle reach into one.
@@ -151,7 +152,8 @@ impl Seen {
             self.tiles.push(Tile {
                 bounds: [clip(x, 0), clip(y, 1), clip(x + TILE, 0), clip(y + TILE, 1)],
                 members: [first, self.members.len() as u32],
-                padding: [0; 2],
+                picture: 0,
+                padding: 0,
             });
         }
         self.runs.push(Run::Cycle(first_tile..self.tiles.len() as u32));

@@ -1,18 +1,25 @@
 #version 450
 #extension GL_ARB_shading_language_include : require
-// A tile of a cycle of tetrahedra as two triangles.
+// switches: LIGHT
+// A square of pixels as two triangles.
 
 #include "shell.glsl"
 
 layout(set = 0, binding = 1, std430) readonly buffer Tiles { Tile tiles[]; };
 
 layout(location = 0) flat out uvec2 members; // range of the list of cells: first, end
+#ifdef LIGHT
+layout(location = 1) flat out uint picture;
+#endif
 
 const uint CORNERS[6] = uint[](0, 1, 2, 0, 2, 3);
 
 void main() {
     Tile tile = tiles[gl_VertexIndex / 6];
     members = tile.members;
+#ifdef LIGHT
+    picture = tile.picture;
+#endif
     uint corner = CORNERS[gl_VertexIndex % 6];
     bool right = corner == 1 || corner == 2;
     bool low = corner >= 2;

@@ -1,0 +1,13 @@
+// A triangle as a light sees it.
+
+struct Blocker {
+    vec4 corners[3];     // in the light's view space, in its unit
+    vec4 depth_function; // x + y, z . place: the depth, or of a light at a point its inverse
+    uint picture;
+};
+
+// Where a place in the picture, in pixels from its middle, lies on the triangle's plane.
+float blocker_depth(vec3 depth_function, vec2 place, bool is_parallel) {
+    float value = depth_function.x + dot(depth_function.yz, place);
+    return is_parallel ? value : 1.0 / value;
+}

@@ -1,0 +1,65 @@
+// What stands between a light and a point: read from the light's pictures, the mean of the four pixels around the point.
+
+#include "picture.glsl"
+#include "curve.glsl"
+
+layout(set = 0, binding = 10) uniform sampler2D curve_0;
+layout(set = 0, binding = 11) uniform sampler2D curve_1;
+layout(set = 0, binding = 12) uniform sampler2D curve_2;
+layout(set = 0, binding = 13) uniform sampler2D curve_3;
+#ifdef SOLIDS
+#include "blocker.glsl"
+layout(set = 0, binding = 14) uniform sampler2D blockers;
+#endif
+
+const vec2 NEVER = vec2(3.0e38);
+
+// How many of the falls from knot to knot are done at a depth; knots may coincide.
+float falls_done(vec4 from, vec4 to, float depth) {
+    return dot(clamp((depth - from) / max(to - from, 1e-7), 0.0, 1.0), vec4(1.0));
+}
+
+// Of the medium alone, along the ray of one pixel.
+float transmittance_until(ivec2 pixel, float depth) {
+    vec4 a = texelFetch(curve_0, pixel, 0);
+    if (a.x == 0.0 || depth <= a.y) return 1.0;
+    vec4 d = texelFetch(curve_3, pixel, 0);
+    if (depth >= d.w) return 1.0 - a.x;
+    vec4 b = texelFetch(curve_1, pixel, 0);
+    vec4 c = texelFetch(curve_2, pixel, 0);
+    float done = falls_done(vec4(a.yzw, b.x), vec4(a.zw, b.xy), depth) + falls_done(vec4(b.yzw, c.x), vec4(b.zw, c.xy), depth)
+        + falls_done(vec4(c.yzw, d.x), vec4(c.zw, d.xy), depth) + falls_done(vec4(d.yz, d.ww), vec4(d.zw, NEVER), depth);
+    return 1.0 - a.x * done / float(FALLS);
+}
+
+float let_through(uvec2 pictures, vec3 point) {
+    for (uint i = pictures.x; i < pictures.y; i++) {
+        LightPicture light = light_pictures[i];
+        vec4 at = vec4(point, 1.0);
+        vec3 place = vec3(dot(light.from_world[0], at), dot(light.from_world[1], at), dot(light.from_world[2], at));
+        bool is_parallel = light.is_parallel != 0;
+        if (!is_parallel) {
+            if (!(place.z > 0.0)) continue;
+            place.xy /= place.z;
+        }
+        place.y = -place.y;
+        if (!(max(abs(place.x), abs(place.y)) <= light.half_side - 1.0)) continue; // four pixels of it are read
+        vec2 corner = light.middle + place.xy - 0.5;
+        vec2 low = floor(corner);
+        vec2 part = corner - low;
+        float sum = 0.0;
+        for (int j = 0; j < 4; j++) {
+            ivec2 offset = ivec2(j & 1, j >> 1);
+            vec2 weights = mix(1.0 - part, part, vec2(offset));
+            ivec2 pixel = ivec2(low) + offset;
+            float through = transmittance_until(pixel, place.z);
+#ifdef SOLIDS
+            vec4 blocker = texelFetch(blockers, pixel, 0);
+            if (blocker.w > 0.0 && place.z > blocker_depth(blocker.xyz, place.xy, is_parallel)) through = 0.0;
+#endif
+            sum += weights.x * weights.y * through;
+        }
+        return sum;
+    }
+    return 1.0; // beside all that could stand in the way
+}
