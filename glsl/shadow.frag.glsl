@@ -2,7 +2,7 @@
 #extension GL_ARB_shading_language_include : require
 // A pixel of a light's picture: how the medium dims the light along its ray. The order of tetrahedra does not matter to the
 // whole, but the curve is made front to back, by the same means as cycle.frag.glsl; where media overlap, they add.
-// First the opacity of all is found, then the depths at which equal parts of it are reached.
+// Knots are placed as the opacity grows; once there are too many, every other one is left out.
 
 #define LIGHT
 #include "shell.glsl"
@@ -17,34 +17,52 @@ layout(location = 1) flat in uint picture;
 
 layout(location = 0) out vec4 out_curve[CURVE_IMAGES];
 
-// Optical depth after which there is no light left for f32.
-const float DARK = 17.0;
-// The last knot stands where this part of a fall is left: an exponential has no end.
+// Optical depth after which what is left of the light does not count: a thousandth.
+const float DARK = 7.0;
+// An exponential has no end: from the last knot that an opaque ray has, 1 - 1 / GROWTHS, the line goes to where this part of the
+// rest is left.
 const float LEFT = 0.125;
 // Shorter steps than any; keeps an infinite extinction times nothing from being no number.
 const float LEAST = 1e-30;
 
 float knots[KNOTS];
 uint placed = 0;
+float growth = 1.0 / (512.0 * float(GROWTHS)); // of opacity, from knot to knot
+float all_but_dark = 3.0e38; // the depth at which LEFT is left
 
-// Places the knots that are reached in a step at depth `from`, before which the optical depth is `before`.
-void place(float from, float step, float before, float optical, float whole) {
-    while (placed < KNOTS) {
-        float falls = placed < FALLS ? float(placed) : float(FALLS) - LEFT;
-        float wanted = optical_depth(whole * falls / float(FALLS));
-        if (wanted > before + optical) break;
-        knots[placed++] = from + step * clamp((wanted - before) / optical, 0.0, 1.0);
-    }
+// Where in a step of an optical depth, after another one, that one is reached.
+float reach(float wanted, float before, float optical, float from, float step) {
+    return from + step * clamp((wanted - before) / optical, 0.0, 1.0);
 }
 
-// The optical depth of the ray. Where `placing`, knots are placed, `whole` being the opacity of all.
-float follow(vec3 origin, vec3 ray, bool placing, float whole) {
+// Leaves out every other knot.
+void thin_out() {
+    for (uint i = 0; i < KNOTS / 2; i++) knots[i] = knots[2 * i];
+    placed = (placed + 1) / 2;
+    growth *= 2.0;
+}
+
+// Places the knots that are reached in a step at depth `from`, before which the optical depth is `before`.
+void place(float from, float step, float before, float optical) {
+    float now = before + optical;
+    float grown = min(opacity(now), 1.0);
+    while (grown >= growth * float(KNOTS)) thin_out();
+    for (; float(placed) * growth <= grown && placed < KNOTS; placed++) {
+        knots[placed] = reach(optical_depth(float(placed) * growth), before, optical, from, step);
+    }
+    float nearly = optical_depth(1.0 - LEFT / float(GROWTHS));
+    if (now >= nearly && all_but_dark >= 3.0e38) all_but_dark = reach(nearly, before, optical, from, step);
+}
+
+// The optical depth of the ray, and where it ends.
+float follow(vec3 origin, vec3 ray, out float end_depth) {
     LightPicture light = light_pictures[picture];
     bool is_parallel = light.is_parallel != 0;
     float per_depth = length(ray) * light.opacity_distances;
     float optical = 0.0;
     float z = 0.0;
     float horizon;
+    end_depth = 0.0;
     bool done = false;
     do {
         uint count = gather(origin, ray, z, horizon);
@@ -63,10 +81,13 @@ float follow(vec3 origin, vec3 ray, bool placing, float whole) {
             }
             if (end < count) next = min(next, spans[end].x);
             uint samples = 0;
+            uint present = 0;
+            Path path; // of the last one, which mostly is the only one: it need not be read again for every sample
             for (uint hit = first; hit < end; hit++) {
                 if (spans[hit].y <= z) continue;
-                Path path = path_from(cells[hits[hit]].texture, origin, ray, light.pixel, is_parallel);
+                path = path_from(cells[hits[hit]].texture, origin, ray, light.pixel, is_parallel);
                 samples = max(samples, sample_count(path, z, next));
+                present++;
             }
             passes += AT_ONCE * (end - first + 2) * (samples + 3);
             if (passes > MOST_PASSES) break;
@@ -74,14 +95,19 @@ float follow(vec3 origin, vec3 ray, bool placing, float whole) {
             for (uint i = 0; i < samples; i++) {
                 float at = z + (float(i) + 0.5) * step;
                 float of_step = 0.0;
-                for (uint hit = first; hit < end; hit++) {
-                    if (spans[hit].y <= z) continue;
-                    Path path = path_from(cells[hits[hit]].texture, origin, ray, light.pixel, is_parallel);
-                    of_step += extinction(fetch(path, at)) * max(step * per_depth, LEAST);
+                if (present == 1) {
+                    of_step = extinction(fetch(path, at));
+                } else {
+                    for (uint hit = first; hit < end; hit++) {
+                        if (spans[hit].y <= z) continue;
+                        of_step += extinction(fetch(path_from(cells[hits[hit]].texture, origin, ray, light.pixel, is_parallel), at));
+                    }
                 }
+                of_step *= max(step * per_depth, LEAST);
                 if (of_step > 0.0) {
-                    if (placing) place(z + float(i) * step, step, optical, of_step, whole);
+                    place(z + float(i) * step, step, optical, of_step);
                     optical += of_step;
+                    end_depth = z + float(i + 1) * step;
                 }
             }
             z = next;
@@ -97,14 +123,18 @@ void main() {
     vec2 place = (gl_FragCoord.xy - light.middle) * vec2(light.pixel, -light.pixel);
     vec3 origin = light.is_parallel != 0 ? vec3(place, 0.0) : vec3(0.0);
     vec3 ray = light.is_parallel != 0 ? vec3(0.0, 0.0, 1.0) : vec3(place, 1.0);
-    float optical = follow(origin, ray, false, 0.0);
+    float end;
+    float optical = follow(origin, ray, end);
     if (optical == 0.0) discard;
     float whole = min(opacity(optical), 1.0);
-    passes = 0;
-    follow(origin, ray, true, whole);
-    // The last of them may be lost to rounding.
-    for (; placed < KNOTS; placed++) knots[placed] = placed > 0 ? knots[placed - 1] : 0.0;
+    end = min(end, all_but_dark);
+    // A line through the last knot that reaches the opacity of all at the end; beyond, there are none.
+    if (placed == KNOTS) thin_out();
+    float last = knots[placed - 1];
+    float rest = whole - float(placed - 1) * growth;
+    knots[placed] = rest > 0.0 ? last + (end - last) * growth / rest : last;
+    for (uint i = placed + 1; i < KNOTS; i++) knots[i] = 3.0e38;
     for (uint i = 0; i < CURVE_IMAGES; i++) {
-        for (uint j = 0; j < 4; j++) out_curve[i][j] = i + j == 0 ? whole : knots[4 * i + j - 1];
+        for (uint j = 0; j < 4; j++) out_curve[i][j] = 4 * i + j < 2 ? (j == 0 ? growth : whole) : knots[4 * i + j - 2];
     }
 }

@@ -12,24 +12,23 @@ layout(set = 0, binding = 13) uniform sampler2D curve_3;
 layout(set = 0, binding = 14) uniform sampler2D blockers;
 #endif
 
-const vec2 NEVER = vec2(3.0e38);
-
-// How many of the falls from knot to knot are done at a depth; knots may coincide.
-float falls_done(vec4 from, vec4 to, float depth) {
+// How many of the growths from knot to knot are done at a depth; knots may coincide.
+float growths_done(vec4 from, vec4 to, float depth) {
     return dot(clamp((depth - from) / max(to - from, 1e-7), 0.0, 1.0), vec4(1.0));
 }
 
 // Of the medium alone, along the ray of one pixel.
 float transmittance_until(ivec2 pixel, float depth) {
     vec4 a = texelFetch(curve_0, pixel, 0);
-    if (a.x == 0.0 || depth <= a.y) return 1.0;
-    vec4 d = texelFetch(curve_3, pixel, 0);
-    if (depth >= d.w) return 1.0 - a.x;
+    if (a.y == 0.0 || depth <= a.z) return 1.0;
     vec4 b = texelFetch(curve_1, pixel, 0);
     vec4 c = texelFetch(curve_2, pixel, 0);
-    float done = falls_done(vec4(a.yzw, b.x), vec4(a.zw, b.xy), depth) + falls_done(vec4(b.yzw, c.x), vec4(b.zw, c.xy), depth)
-        + falls_done(vec4(c.yzw, d.x), vec4(c.zw, d.xy), depth) + falls_done(vec4(d.yz, d.ww), vec4(d.zw, NEVER), depth);
-    return 1.0 - a.x * done / float(FALLS);
+    vec4 d = texelFetch(curve_3, pixel, 0);
+    float last = clamp((depth - d.z) / max(d.w - d.z, 1e-7), 0.0, 1.0);
+    float done = growths_done(vec4(a.zw, b.xy), vec4(a.w, b.xyz), depth)
+        + growths_done(vec4(b.zw, c.xy), vec4(b.w, c.xyz), depth)
+        + growths_done(vec4(c.zw, d.xy), vec4(c.w, d.xyz), depth) + last;
+    return 1.0 - min(done * a.x, a.y);
 }
 
 float let_through(uvec2 pictures, vec3 point) {
