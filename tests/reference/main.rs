@@ -71,7 +71,15 @@ fn slanted_view() -> View {
 
 fn scene(shell: Shell, volume: Pyramid, view: View) -> Scene {
     let medium = Medium { opacity_distance: OPACITY_DISTANCE, lod_footprint: 0.0 };
-    Scene { shell, volume, medium, shading: None, view, march: March::Default { step: 1.0 } }
+    Scene {
+        shell,
+        volume,
+        medium,
+        shading: None,
+        solids: Vec::new(),
+        view,
+        march: March::Default { step: 1.0 },
+    }
 }
 
 fn centre(x: u32, y: u32) -> DVec2 {
