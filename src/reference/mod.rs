@@ -178,9 +178,9 @@ impl<'a> Reference<'a> {
         (crossings, solid)
     }
 
-    /// What is left of the tolerance for panels along the eye's ray: see `shadow`.
+    /// The part of the tolerance that is for panels along the eye's ray.
     fn panels_tolerance(&self) -> f64 {
-        if self.shadows.is_some() { 0.5 * self.tolerance } else { self.tolerance }
+        if self.shadows.is_some() { shadow::OF_PANELS * self.tolerance } else { self.tolerance }
     }
 }
 

@@ -28,19 +28,27 @@ use super::solids::Hit;
 use crate::scene::{Light, LightView, Scene, Source, texel_edges};
 use crate::volume::Quantity;
 
-/// The part of a picture's tolerance that errors of optical depths may use; and that errors of interpolation along the eye's ray may.
-/// Half of the tolerance is left for panels.
-const SHARE: f64 = 0.25;
+/// The part of a picture's tolerance that errors of panels on the eye's ray may use.
+pub const OF_PANELS: f64 = 0.25;
+
+/// The part that errors of optical depths may use.
+const OF_DEPTHS: f64 = 0.25;
+
+/// The part that errors of interpolation may use.
+const OF_PENUMBRAE: f64 = 0.5;
 
 /// The length of a whole stretch of a [`Penumbra`], in texels of level 0 along the axis on which they are shortest.
 const TEXELS_OF_STRETCH: f64 = 4.0;
 
-/// The share of [`SHARE`] that every panel may use, however short it is.
+/// The share of [`OF_DEPTHS`] that every panel may use, however short it is.
 const SHARE_OF_EACH: f64 = 1e-3;
 
 /// The width of the narrowest panels, as a part of their piece: what a panel at a root of `1 - alpha` holds is about as much, times
 /// the logarithm.
 const NARROWEST: f64 = 1e-12;
+
+/// A product of two such is no zero yet.
+const LEAST_CLEAR: f64 = 1e-150;
 
 /// Where a path runs less far than this in a wall, in texels, it does not meet it.
 const THINNEST_WALL: f64 = 1e-7;
@@ -114,10 +122,11 @@ impl Shadows {
         if reference.solids.hide(&Path { from: NEAREST_SOLID * point.length(), ..path }, own) {
             return 0.0;
         }
-        let allowed = SHARE * reference.tolerance / self.weight;
+        let allowed = OF_DEPTHS * reference.tolerance / self.weight;
         let detail_per_texel = reference.lod_footprint * pixel;
         let ray = Ray { eye, start: point, direction, width, detail_per_texel };
-        let mut depth = OpticalDepth { scene, ray, allowed, extent: self.extent, sum: 0.0 };
+        let mut depth =
+            OpticalDepth { scene, ray, allowed, most: -allowed.ln(), extent: self.extent, sum: 0.0 };
         reference.crossings.visit(&path, |crossing| {
             depth.add(crossing.tetrahedron, crossing.enter, crossing.exit);
             depth.is_open()
@@ -157,7 +166,7 @@ impl<'a> ShadowsOnRay<'a> {
     pub fn interpolated(&mut self, light: usize, depth: f64, before: f64) -> f64 {
         let Self { reference, direction, penumbrae, paths } = self;
         let Some(shadows) = &reference.shadows else { return 1.0 };
-        let allowed = SHARE * reference.tolerance / (shadows.weight * before);
+        let allowed = OF_PENUMBRAE * reference.tolerance / (shadows.weight * before);
         penumbrae[light].at(depth, allowed, |depth| {
             *paths += 1;
             shadows.transmittance(reference, light, depth * *direction, None)
@@ -188,6 +197,8 @@ struct OpticalDepth<'a> {
     scene: &'a Scene,
     ray: Ray,
     allowed: f64,
+    /// Where depth is more, nothing passes.
+    most: f64,
     extent: f64,
     sum: f64,
 }
@@ -195,7 +206,7 @@ struct OpticalDepth<'a> {
 impl OpticalDepth<'_> {
     /// Whether anything passes.
     fn is_open(&self) -> bool {
-        (-self.sum).exp() > self.allowed
+        self.sum < self.most
     }
 
     /// Adds what a tetrahedron holds between two places on the path.
@@ -234,21 +245,27 @@ impl OpticalDepth<'_> {
         let width = high - low;
         let length = width * piece.length;
         let scale = length / self.scene.medium.opacity_distance;
-        let (mut depth, mut coarse_depth) = (0.0, 0.0);
-        for i in 0..SHORT_NODES.len() {
+        let texels: [_; 7] = std::array::from_fn(|i| {
             let x = low + width * SHORT_NODES[i];
-            let [alpha, clear] = layer.at(x, piece.start + x * piece.length);
-            let extinction = match quantity {
-                Quantity::Extinction => alpha,
-                Quantity::Opacity if alpha < 0.5 => -(-alpha).ln_1p(),
-                Quantity::Opacity => -clear.max(f64::MIN_POSITIVE).ln(),
-            };
-            depth += SHORT_WEIGHTS[i] * extinction;
-            coarse_depth += SHORT_COARSE_WEIGHTS[i] * extinction;
-        }
-        let error = scale * (depth - coarse_depth).abs();
-        let share = length / self.extent + SHARE_OF_EACH;
-        if width > NARROWEST && error * (-self.sum).exp() > 0.5 * self.allowed * share {
+            layer.at(x, piece.start + x * piece.length)
+        });
+        // Of two nodes at once: logarithms are what this costs.
+        let pair = |i: usize| {
+            let [[alpha, clear], [other_alpha, other_clear]] = [texels[i], texels[6 - i]];
+            match quantity {
+                Quantity::Extinction => alpha + other_alpha,
+                Quantity::Opacity => -(clear.max(LEAST_CLEAR) * other_clear.max(LEAST_CLEAR)).ln(),
+            }
+        };
+        let mut extinction: [f64; 4] = std::array::from_fn(pair);
+        extinction[3] *= 0.5;
+        let sum = |weights: &[f64; 4]| -> f64 {
+            weights.iter().zip(extinction).map(|(weight, extinction)| weight * extinction).sum()
+        };
+        let depth = sum(&SHORT_WEIGHTS);
+        let error = scale * (depth - sum(&SHORT_COARSE_WEIGHTS)).abs();
+        let limit = 0.5 * self.allowed * (length / self.extent + SHARE_OF_EACH);
+        if width > NARROWEST && error > limit && error * (-self.sum).exp() > limit {
             let middle = low + 0.5 * width;
             self.panels(layer, piece, low, middle);
             self.panels(layer, piece, middle, high);
