@@ -11,7 +11,7 @@ use crate::scene::{Light, Model, Scene, Shading, Solid, Source, View};
 use crate::volume::{DirectionLevel, Quantity, Volume};
 
 /// The code that a cached reference comes from: were it changed, so might its pictures be.
-const REFERENCE_CODE: [(&str, &str); 12] = [
+const REFERENCE_CODE: [(&str, &str); 13] = [
     ("crossing.rs", include_str!("../reference/crossing.rs")),
     ("hierarchy.rs", include_str!("../reference/hierarchy.rs")),
     ("integrate.rs", include_str!("../reference/integrate.rs")),
@@ -24,6 +24,7 @@ const REFERENCE_CODE: [(&str, &str); 12] = [
     ("solids.rs", include_str!("../reference/solids.rs")),
     ("supersample.rs", include_str!("../reference/supersample.rs")),
     ("texture.rs", include_str!("../reference/texture.rs")),
+    ("umbra.rs", include_str!("../reference/umbra.rs")),
 ];
 
 /// What of a scene the reference asks for: rays, and the density of texels across them.

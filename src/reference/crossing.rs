@@ -33,6 +33,8 @@ struct Plane {
     at_eye: f64,
     /// Distance from the eye to the vertex from which `at_eye` was measured: its rounding grows with it.
     reach: f64,
+    /// Slopes per world unit up to this are taken for none.
+    steepness: f64,
 }
 
 /// Finds the tetrahedra on a path.
@@ -88,13 +90,13 @@ impl Crossings {
     }
 
     fn clip(&self, tetrahedron: usize, path: &Path, start_reach: f64) -> Option<(f64, f64)> {
+        let unit = path.direction.length();
         let (mut enter, mut exit) = (path.from, f64::INFINITY);
         for plane in &self.planes[tetrahedron] {
             let slope = plane.gradient.dot(path.direction);
             let at_start = plane.at_eye + plane.gradient.dot(path.start);
-            let steepness = EDGE_ON * plane.gradient.length();
-            if slope.abs() <= steepness * path.direction.length()
-                && at_start.abs() <= steepness * (plane.reach + start_reach)
+            if slope.abs() <= plane.steepness * unit
+                && at_start.abs() <= plane.steepness * (plane.reach + start_reach)
             {
                 if plane.gradient.dot(path.aside) <= 0.0 {
                     return None;
@@ -118,7 +120,8 @@ fn own_plane(shell: &Shell, eye: DVec3, tetrahedron: usize, face: usize) -> Plan
     let gradient = shell.cells[tetrahedron].gradients[face];
     let on_face = shell.topology.tetrahedra[tetrahedron][(face + 1) % 4];
     let from_vertex = eye - shell.vertices[on_face as usize];
-    Plane { gradient, at_eye: gradient.dot(from_vertex), reach: from_vertex.length() }
+    let steepness = EDGE_ON * gradient.length();
+    Plane { gradient, at_eye: gradient.dot(from_vertex), reach: from_vertex.length(), steepness }
 }
 
 /// The plane of a face that a tetrahedron of lower index shares, turned to this tetrahedron's side.
@@ -140,7 +143,7 @@ fn shared_plane(shell: &Shell, planes: &[[Plane; 4]], tetrahedron: usize, face: 
     })?;
     let plane = planes[neighbour][back];
     let gradient = shell.cells[tetrahedron].gradients[face];
-    let turned = Plane { gradient: -plane.gradient, at_eye: -plane.at_eye, reach: plane.reach };
+    let turned = Plane { gradient: -plane.gradient, at_eye: -plane.at_eye, ..plane };
     Some(if gradient.dot(plane.gradient) < 0.0 { turned } else { plane })
 }
 

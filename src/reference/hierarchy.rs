@@ -89,6 +89,34 @@ impl Hierarchy {
         self.descend(0, &slabs, &mut to, &mut found);
     }
 
+    /// Calls `found` with the index of all that may meet a plane through the eye near the hull of some points in it, in any order.
+    pub fn visit_plane(&self, normal: DVec3, hull: &[DVec3], mut found: impl FnMut(usize)) {
+        if self.boxes.is_empty() {
+            return;
+        }
+        let [low, high] = [DVec3::min, DVec3::max].map(|pick| hull.iter().copied().reduce(pick));
+        let [low, high] = [low, high].map(|corner| corner.unwrap_or_default() / self.unit);
+        let meets = |bounds: &Aabb<f64, 3>| {
+            let [min, max] = [bounds.min, bounds.max].map(|corner| DVec3::new(corner.x, corner.y, corner.z));
+            let (middle, half) = (0.5 * (min + max), 0.5 * (max - min));
+            min.cmple(high).all()
+                && max.cmpge(low).all()
+                && normal.dot(middle).abs() <= normal.abs().dot(half)
+        };
+        let mut waiting = vec![0];
+        while let Some(node) = waiting.pop() {
+            match &self.tree.nodes[node] {
+                BvhNode::Leaf { shape_index, .. } => found(self.boxes[*shape_index].index),
+                BvhNode::Node { child_l_index, child_l_aabb, child_r_index, child_r_aabb, .. } => {
+                    let children = [(*child_l_index, child_l_aabb), (*child_r_index, child_r_aabb)];
+                    waiting.extend(
+                        children.into_iter().filter(|(_, bounds)| meets(bounds)).map(|(child, _)| child),
+                    );
+                }
+            }
+        }
+    }
+
     fn descend(&self, node: usize, slabs: &Slabs, to: &mut f64, found: &mut impl FnMut(usize, &mut f64)) {
         match &self.tree.nodes[node] {
             BvhNode::Leaf { shape_index, .. } => found(self.boxes[*shape_index].index, to),

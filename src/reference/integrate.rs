@@ -1,7 +1,7 @@
 //! The integral along one ray: `C = integral of T sigma c`, `T = exp(-integral of sigma)`, front to back.
 //!
-//! The ray is cut where the set of tetrahedra changes, where a level of detail is an integer, and at the
-//! planes of texel centres. On the *pieces* between, the premultiplied texture is a cubic (a smooth blend of
+//! The ray is cut where the set of tetrahedra changes, where a level of detail is an integer, where the shadow of a solid begins or
+//! ends, and at the planes of texel centres. On the *pieces* between, the premultiplied texture is a cubic (a smooth blend of
 //! two, between levels), and `sigma` is smooth unless alpha reaches 1. A *panel* is a piece, or
 //! a binary fraction of one: extinction and emission are taken at the nodes of [`Rule`], the optical depth
 //! at each node is the integral of the interpolant of `sigma`, and the colour follows with
@@ -161,13 +161,13 @@ impl<'a> RayIntegral<'a> {
         self.transmittance * self.brightness < 1e-3 * self.tolerance
     }
 
-    /// Cuts a segment where a level of detail is an integer.
+    /// Cuts a segment where a level of detail is an integer, and where a solid's shadow begins or ends.
     fn segment(&mut self, from: f64, to: f64, active: &[Crossing]) {
         let details: Vec<f64> =
             active.iter().map(|crossing| self.ray.detail(self.scene, crossing.tetrahedron)).collect();
         let mut start = from;
         while start < to && !self.is_done() {
-            let end = self.ray.span_end(self.scene, &details, start, to);
+            let end = self.ray.span_end(self.scene, &details, start, to).min(self.shadows.next_edge(start));
             self.layers.clear();
             for (crossing, &detail) in active.iter().zip(&details) {
                 let layer = self.layer(crossing.tetrahedron, detail, start, 0.5 * (start + end));

@@ -41,6 +41,8 @@ pub struct Layer<'a, const N: usize = 5> {
     fine: Lattice<'a, N>,
     /// The next level, if the level of detail lies between the two.
     coarse: Option<Lattice<'a, N>>,
+    /// Where the width does not change, the part of the coarser level: pieces are blended as they are loaded.
+    part: Option<f64>,
     /// Of the current piece.
     fine_cubic: Cubic<N>,
     coarse_cubic: Cubic<N>,
@@ -104,6 +106,7 @@ impl<'a, const N: usize> Layer<'a, N> {
             level,
             fine: Lattice::new(&levels[level], texture, texture_slope),
             coarse: is_between.then(|| Lattice::new(&levels[level + 1], texture, texture_slope)),
+            part: (ray.width.slope == 0.0).then_some(level_of_detail - level as f64),
             fine_cubic: Cubic::EMPTY,
             coarse_cubic: Cubic::EMPTY,
             texture,
@@ -138,20 +141,26 @@ impl<'a, const N: usize> Layer<'a, N> {
         let coarse = self.coarse.as_mut().and_then(|lattice| lattice.cubic(from, to));
         self.fine_cubic = fine.unwrap_or(Cubic::EMPTY);
         self.coarse_cubic = coarse.unwrap_or(Cubic::EMPTY);
+        if let Some(part) = self.part.filter(|_| self.is_between()) {
+            self.fine_cubic = self.fine_cubic.lerp(&self.coarse_cubic, part);
+        }
         fine.is_some() || coarse.is_some()
     }
 
     /// Whether alpha is 1 all along the piece.
     pub fn is_wall(&self) -> bool {
-        self.fine_cubic.is_wall() && (self.coarse.is_none() || self.coarse_cubic.is_wall())
+        self.fine_cubic.is_wall() && (!self.is_between() || self.coarse_cubic.is_wall())
     }
 
     /// The texture at `x` (0..1) of the piece, which is at `t`.
     pub fn at(&self, x: f64, t: f64) -> Texel<N> {
+        if self.part.is_some() {
+            return self.fine_cubic.at(x);
+        }
         self.blend(t, || self.fine_cubic.at(x), || self.coarse_cubic.at(x))
     }
 
-    /// Of a value in the finer level and in the coarser one that at the level of detail at `t`.
+    /// Of a value in the finer level and in the coarser one that at the level of detail at `t`, where the width changes.
     pub fn blend<const M: usize>(
         &self,
         t: f64,
@@ -159,7 +168,7 @@ impl<'a, const N: usize> Layer<'a, N> {
         coarse: impl Fn() -> Texel<M>,
     ) -> Texel<M> {
         let fine = fine();
-        if self.coarse.is_none() {
+        if !self.is_between() {
             return fine;
         }
         let coarse = coarse();

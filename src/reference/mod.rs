@@ -31,6 +31,7 @@ mod shadow;
 mod solids;
 mod supersample;
 mod texture;
+mod umbra;
 
 pub use supersample::render_supersampled;
 
@@ -115,8 +116,7 @@ impl Counts {
 impl<'a> Reference<'a> {
     /// Prepares the scene for the eye of `view`; `scene.view` is not read.
     pub fn new(scene: &'a Scene, view: &View) -> Self {
-        let unlit = unlit_brightness(scene);
-        let eye = view.camera.eye;
+        let (eye, unlit) = (view.camera.eye, unlit_brightness(scene));
         Self {
             scene,
             view: *view,
@@ -124,7 +124,7 @@ impl<'a> Reference<'a> {
             tolerance: tolerance(scene),
             brightness: brightness(scene, unlit),
             lit: Lit::of(scene),
-            shadows: Shadows::of(scene, unlit),
+            shadows: Shadows::of(scene, eye, unlit),
             rule: Rule::new(),
             crossings: Crossings::new(&scene.shell, eye),
             solids: Solids::new(scene, eye),
@@ -178,9 +178,9 @@ impl<'a> Reference<'a> {
         (crossings, solid)
     }
 
-    /// What is left of the tolerance for panels along the eye's ray: see `shadow`.
+    /// The part of the tolerance that is for panels along the eye's ray.
     fn panels_tolerance(&self) -> f64 {
-        if self.shadows.is_some() { 0.5 * self.tolerance } else { self.tolerance }
+        if self.shadows.is_some() { shadow::OF_PANELS * self.tolerance } else { self.tolerance }
     }
 }
 

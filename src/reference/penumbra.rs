@@ -1,19 +1,19 @@
-//! What reaches the points of an eye's ray from a light, traced at a few of them and interpolated between.
+//! What the medium lets through to the points of an eye's ray from a light, traced at a few of them and interpolated between.
 //!
 //! Along a ray the integrand is asked for at thousands of points, and a path to the light costs as much as a dozen of
 //! them. But what passes is itself an integral, and smooth as integrals are: mostly it does not change from one
 //! texel to the next by more than a polynomial says. So the ray is cut into *stretches* of a few texels; each is traced at nine
-//! equally spaced points when it is first asked for. If the quartic through five of them tells the other four to within what is
-//! allowed, the two halves are quartics; else the stretch is halved, and five of a half's nine points are known. For a smooth
-//! function the quartic of a half errs by a 32nd of the difference that was tested, where the second derivative has a kink by a
-//! quarter. At an edge of a solid's shadow halving ends at [`NARROWEST`].
+//! equally spaced points when it is first asked for. If the quartic through five of them tells the other four to within twice what
+//! is allowed, the two halves are quartics; else the stretch is halved, and five of a half's nine points are known. The quartic of
+//! a half errs by half of the difference that was tested where the function has a kink, by a quarter where its derivative has, and
+//! by a 32nd where it is smooth. At a jump, where the ray enters a wall, halving ends at [`NARROWEST`].
 //!
 //! The integral weights an error by the transmittance before the point, so what is allowed grows as the ray goes on: deep in the
 //! medium a few paths do. Nothing is traced where the integrand is not asked for, as in empty space, or where the
 //! surface faces away from the light.
 //!
-//! What is thinner than an eighth of a stretch, half a texel, may be overlooked: a shadow of the medium never is so thin, that of a
-//! solid may be.
+//! A shadow thinner than an eighth of a stretch, half a texel, may be overlooked: the medium casts none so thin. Those of
+//! solids are known exactly: see `umbra`.
 
 /// Points of a stretch.
 const POINTS: usize = 9;
@@ -101,7 +101,7 @@ impl Penumbra {
     fn add(&mut self, values: [f64; POINTS], allowed: f64) -> u32 {
         let five = std::array::from_fn(|i| values[2 * i]);
         let misses = (1..POINTS).step_by(2).map(|i| (quartic(&five, 0.5 * i as f64) - values[i]).abs());
-        let is_smooth = misses.fold(0.0, f64::max) <= allowed;
+        let is_smooth = misses.fold(0.0, f64::max) <= 2.0 * allowed;
         self.stretches.push(Stretch { values, is_smooth, halves: [UNKNOWN; 2] });
         (self.stretches.len() - 1) as u32
     }

@@ -25,22 +25,31 @@ use super::layer::{Layer, Ray, Width};
 use super::penumbra::Penumbra;
 use super::quadrature::{SHORT_COARSE_WEIGHTS, SHORT_NODES, SHORT_WEIGHTS};
 use super::solids::Hit;
+use super::umbra::{Beacon, Umbra};
 use crate::scene::{Light, LightView, Scene, Source, texel_edges};
 use crate::volume::Quantity;
 
-/// The part of a picture's tolerance that errors of optical depths may use; and that errors of interpolation along the eye's ray may.
-/// Half of the tolerance is left for panels.
-const SHARE: f64 = 0.25;
+/// The part of a picture's tolerance that errors of panels on the eye's ray may use.
+pub const OF_PANELS: f64 = 0.25;
+
+/// The part that errors of optical depths may use.
+const OF_DEPTHS: f64 = 0.25;
+
+/// The part that errors of interpolation may use.
+const OF_PENUMBRAE: f64 = 0.5;
 
 /// The length of a whole stretch of a [`Penumbra`], in texels of level 0 along the axis on which they are shortest.
 const TEXELS_OF_STRETCH: f64 = 4.0;
 
-/// The share of [`SHARE`] that every panel may use, however short it is.
+/// The share of [`OF_DEPTHS`] that every panel may use, however short it is.
 const SHARE_OF_EACH: f64 = 1e-3;
 
 /// The width of the narrowest panels, as a part of their piece: what a panel at a root of `1 - alpha` holds is about as much, times
 /// the logarithm.
 const NARROWEST: f64 = 1e-12;
+
+/// A product of two such is no zero yet.
+const LEAST_CLEAR: f64 = 1e-150;
 
 /// Where a path runs less far than this in a wall, in texels, it does not meet it.
 const THINNEST_WALL: f64 = 1e-7;
@@ -55,6 +64,8 @@ const ASIDE: DVec3 = DVec3::new(0.618_03, 0.414_21, 0.732_05);
 pub struct Shadows {
     /// For each light of the scene [`LightView::pixel`].
     pixels: Vec<Option<f64>>,
+    /// For each light of the scene.
+    beacons: Vec<Beacon>,
     /// How much of an error of what reaches a point from all these lights may be seen, at most.
     weight: f64,
     /// In world units: no straight line in the scene is longer.
@@ -72,7 +83,7 @@ struct Piece {
 
 impl Shadows {
     /// `None` where no light casts shadows. Nothing in the scene is brighter, unlit, than `unlit`.
-    pub fn of(scene: &Scene, unlit: f64) -> Option<Self> {
+    pub fn of(scene: &Scene, eye: DVec3, unlit: f64) -> Option<Self> {
         let shading = scene.shading.as_ref()?;
         let (centre, radius) = scene.bounds();
         let pixel = |light: &Light| {
@@ -80,44 +91,68 @@ impl Shadows {
             light.shadow.then(|| first().pixel)
         };
         let pixels: Vec<_> = shading.lights.iter().map(pixel).collect();
+        let beacon = |light: &Light| match light.source {
+            Source::Directional { towards } => Beacon::Far(towards),
+            Source::Point { position, .. } => Beacon::Near(position - eye),
+        };
+        let beacons = shading.lights.iter().map(beacon).collect();
         let light: DVec3 = shading.lights.iter().filter(|light| light.shadow).map(|light| light.colour).sum();
         let weight = light.max_element() * (shading.diffuse * unlit + shading.specular);
         pixels.iter().any(Option::is_some).then(|| {
             let [u, v, w] = texel_edges(&scene.shell, scene.volume.levels[0].size);
-            Self { pixels, weight, extent: 2.0 * radius, stretch: TEXELS_OF_STRETCH * u.min(v).min(w) }
+            Self {
+                pixels,
+                beacons,
+                weight,
+                extent: 2.0 * radius,
+                stretch: TEXELS_OF_STRETCH * u.min(v).min(w),
+            }
         })
     }
 
     /// The part of light number `light` that reaches a point relative to the eye, where `own` is the solids' triangle that it is
     /// a point of.
-    pub fn transmittance(
-        &self,
-        reference: &Reference<'_>,
-        light: usize,
-        point: DVec3,
-        own: Option<usize>,
-    ) -> f64 {
-        let (scene, eye) = (reference.scene, reference.view.camera.eye);
-        let (Some(shading), Some(pixel)) = (&scene.shading, self.pixels[light]) else { return 1.0 };
-        let (direction, to, width) = match shading.lights[light].source {
-            Source::Directional { towards } => (towards, f64::INFINITY, Width { at_start: 1.0, slope: 0.0 }),
-            Source::Point { position, .. } => {
-                let way = (position - eye) - point;
-                let distance = way.length();
-                if distance == 0.0 {
-                    return 1.0;
-                }
-                (way / distance, distance, Width { at_start: distance, slope: -1.0 })
+    fn reaching(&self, reference: &Reference<'_>, light: usize, point: DVec3, own: Option<usize>) -> f64 {
+        if self.is_hidden(reference, light, point, own) {
+            0.0
+        } else {
+            self.transmittance(reference, light, point)
+        }
+    }
+
+    /// Whether a solid, but for the triangle `own`, stands before the light.
+    fn is_hidden(&self, reference: &Reference<'_>, light: usize, point: DVec3, own: Option<usize>) -> bool {
+        let (direction, to) = self.way(light, point);
+        let from = NEAREST_SOLID * point.length();
+        reference.solids.hide(&Path { start: point, direction, from, to, aside: ASIDE }, own)
+    }
+
+    /// The unit vector from a point to a light, and the distance between the two.
+    fn way(&self, light: usize, point: DVec3) -> (DVec3, f64) {
+        match self.beacons[light] {
+            Beacon::Far(towards) => (towards, f64::INFINITY),
+            Beacon::Near(place) => {
+                let way = place - point;
+                (way.normalize_or(DVec3::Y), way.length())
             }
+        }
+    }
+
+    /// What the medium alone lets through.
+    fn transmittance(&self, reference: &Reference<'_>, light: usize, point: DVec3) -> f64 {
+        let (scene, eye) = (reference.scene, reference.view.camera.eye);
+        let Some(pixel) = self.pixels[light] else { return 1.0 };
+        let (direction, to) = self.way(light, point);
+        let width = match self.beacons[light] {
+            Beacon::Far(_) => Width { at_start: 1.0, slope: 0.0 },
+            Beacon::Near(_) => Width { at_start: to, slope: -1.0 },
         };
         let path = Path { start: point, direction, from: 0.0, to, aside: ASIDE };
-        if reference.solids.hide(&Path { from: NEAREST_SOLID * point.length(), ..path }, own) {
-            return 0.0;
-        }
-        let allowed = SHARE * reference.tolerance / self.weight;
+        let allowed = OF_DEPTHS * reference.tolerance / self.weight;
         let detail_per_texel = reference.lod_footprint * pixel;
         let ray = Ray { eye, start: point, direction, width, detail_per_texel };
-        let mut depth = OpticalDepth { scene, ray, allowed, extent: self.extent, sum: 0.0 };
+        let mut depth =
+            OpticalDepth { scene, ray, allowed, most: -allowed.ln(), extent: self.extent, sum: 0.0 };
         reference.crossings.visit(&path, |crossing| {
             depth.add(crossing.tetrahedron, crossing.enter, crossing.exit);
             depth.is_open()
@@ -130,21 +165,47 @@ impl Shadows {
 pub struct ShadowsOnRay<'a> {
     reference: &'a Reference<'a>,
     direction: DVec3,
-    /// For each light that casts shadows.
+    /// For each light, in the medium.
     penumbrae: Vec<Penumbra>,
+    /// For each light, of solids.
+    umbrae: Vec<Umbra>,
+    /// Depths where any of these begins or ends, in order.
+    edges: Vec<f64>,
     paths: u64,
 }
 
 impl<'a> ShadowsOnRay<'a> {
     /// For the ray along `direction`, where `crossings` are in order of entry.
     pub fn new(reference: &'a Reference<'a>, direction: DVec3, crossings: &[Crossing]) -> Self {
-        let penumbrae = reference.shadows.as_ref().map_or_else(Vec::new, |shadows| {
-            let start = crossings.first().map_or(0.0, |first| first.enter);
-            let end = crossings.iter().map(|crossing| crossing.exit).fold(start, f64::max);
-            let longest = shadows.stretch / direction.length();
-            shadows.pixels.iter().map(|_| Penumbra::new(start, end, longest)).collect()
-        });
-        Self { reference, direction, penumbrae, paths: 0 }
+        let mut shadows = Self {
+            reference,
+            direction,
+            penumbrae: Vec::new(),
+            umbrae: Vec::new(),
+            edges: Vec::new(),
+            paths: 0,
+        };
+        let Some(Shadows { pixels, beacons, extent, stretch, .. }) = &reference.shadows else {
+            return shadows;
+        };
+        let start = crossings.first().map_or(0.0, |first| first.enter);
+        let end = crossings.iter().map(|crossing| crossing.exit).fold(start, f64::max);
+        for (pixel, &beacon) in pixels.iter().zip(beacons) {
+            let is_asked_for = pixel.is_some() && start < end;
+            let umbra =
+                is_asked_for.then(|| reference.solids.umbra(direction, beacon, [start, end], *extent));
+            shadows.umbrae.push(umbra.unwrap_or(Umbra::Unknown));
+            shadows.penumbrae.push(Penumbra::new(start, end, stretch / direction.length()));
+        }
+        shadows.edges = shadows.umbrae.iter().flat_map(Umbra::edges).copied().collect();
+        shadows.edges.sort_unstable_by(f64::total_cmp);
+        shadows
+    }
+
+    /// The first depth after this one at which the shadow of a solid begins or ends.
+    pub fn next_edge(&self, depth: f64) -> f64 {
+        let next = self.edges.partition_point(|edge| *edge <= depth);
+        self.edges.get(next).copied().unwrap_or(f64::INFINITY)
     }
 
     /// How many paths to lights were traced.
@@ -155,12 +216,18 @@ impl<'a> ShadowsOnRay<'a> {
     /// The part of light number `light` that reaches the point at this depth, to what the tolerance allows behind the
     /// transmittance `before`.
     pub fn interpolated(&mut self, light: usize, depth: f64, before: f64) -> f64 {
-        let Self { reference, direction, penumbrae, paths } = self;
+        let Self { reference, direction, penumbrae, umbrae, paths, .. } = self;
         let Some(shadows) = &reference.shadows else { return 1.0 };
-        let allowed = SHARE * reference.tolerance / (shadows.weight * before);
+        let is_hidden = umbrae[light]
+            .holds(depth)
+            .unwrap_or_else(|| shadows.is_hidden(reference, light, depth * *direction, None));
+        if is_hidden {
+            return 0.0;
+        }
+        let allowed = OF_PENUMBRAE * reference.tolerance / (shadows.weight * before);
         penumbrae[light].at(depth, allowed, |depth| {
             *paths += 1;
-            shadows.transmittance(reference, light, depth * *direction, None)
+            shadows.transmittance(reference, light, depth * *direction)
         })
     }
 
@@ -179,7 +246,7 @@ impl<'a> ShadowsOnRay<'a> {
     fn trace(&mut self, light: usize, point: DVec3, own: Option<usize>) -> f64 {
         self.paths += 1;
         let shadows = self.reference.shadows.as_ref();
-        shadows.map_or(1.0, |shadows| shadows.transmittance(self.reference, light, point, own))
+        shadows.map_or(1.0, |shadows| shadows.reaching(self.reference, light, point, own))
     }
 }
 
@@ -188,6 +255,8 @@ struct OpticalDepth<'a> {
     scene: &'a Scene,
     ray: Ray,
     allowed: f64,
+    /// Where depth is more, nothing passes.
+    most: f64,
     extent: f64,
     sum: f64,
 }
@@ -195,7 +264,7 @@ struct OpticalDepth<'a> {
 impl OpticalDepth<'_> {
     /// Whether anything passes.
     fn is_open(&self) -> bool {
-        (-self.sum).exp() > self.allowed
+        self.sum < self.most
     }
 
     /// Adds what a tetrahedron holds between two places on the path.
@@ -234,21 +303,27 @@ impl OpticalDepth<'_> {
         let width = high - low;
         let length = width * piece.length;
         let scale = length / self.scene.medium.opacity_distance;
-        let (mut depth, mut coarse_depth) = (0.0, 0.0);
-        for i in 0..SHORT_NODES.len() {
+        let texels: [_; 7] = std::array::from_fn(|i| {
             let x = low + width * SHORT_NODES[i];
-            let [alpha, clear] = layer.at(x, piece.start + x * piece.length);
-            let extinction = match quantity {
-                Quantity::Extinction => alpha,
-                Quantity::Opacity if alpha < 0.5 => -(-alpha).ln_1p(),
-                Quantity::Opacity => -clear.max(f64::MIN_POSITIVE).ln(),
-            };
-            depth += SHORT_WEIGHTS[i] * extinction;
-            coarse_depth += SHORT_COARSE_WEIGHTS[i] * extinction;
-        }
-        let error = scale * (depth - coarse_depth).abs();
-        let share = length / self.extent + SHARE_OF_EACH;
-        if width > NARROWEST && error * (-self.sum).exp() > 0.5 * self.allowed * share {
+            layer.at(x, piece.start + x * piece.length)
+        });
+        // Of two nodes at once: logarithms are what this costs.
+        let pair = |i: usize| {
+            let [[alpha, clear], [other_alpha, other_clear]] = [texels[i], texels[6 - i]];
+            match quantity {
+                Quantity::Extinction => alpha + other_alpha,
+                Quantity::Opacity => -(clear.max(LEAST_CLEAR) * other_clear.max(LEAST_CLEAR)).ln(),
+            }
+        };
+        let mut extinction: [f64; 4] = std::array::from_fn(pair);
+        extinction[3] *= 0.5;
+        let sum = |weights: &[f64; 4]| -> f64 {
+            weights.iter().zip(extinction).map(|(weight, extinction)| weight * extinction).sum()
+        };
+        let depth = sum(&SHORT_WEIGHTS);
+        let error = scale * (depth - sum(&SHORT_COARSE_WEIGHTS)).abs();
+        let limit = 0.5 * self.allowed * (length / self.extent + SHARE_OF_EACH);
+        if width > NARROWEST && error > limit && error * (-self.sum).exp() > limit {
             let middle = low + 0.5 * width;
             self.panels(layer, piece, low, middle);
             self.panels(layer, piece, middle, high);

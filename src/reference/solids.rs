@@ -11,6 +11,7 @@ use super::Reference;
 use super::hierarchy::{Hierarchy, Path};
 use super::shade::arriving;
 use super::texture::Lattice;
+use super::umbra::{Beacon, Umbra};
 use crate::scene::{Scene, Shading, Solid};
 
 /// All triangles of all solids of a scene.
@@ -86,6 +87,12 @@ impl<'a> Solids<'a> {
             }
         });
         is_hidden
+    }
+
+    /// The shadow that they cast on a part of the eye's ray: see [`Umbra::new`].
+    pub fn umbra(&self, direction: DVec3, beacon: Beacon, range: [f64; 2], extent: f64) -> Umbra {
+        let corners = |triangle: usize| &self.triangles[triangle].corners;
+        Umbra::new(&self.hierarchy, corners, direction, beacon, range, extent)
     }
 
     /// What the eye sees of a triangle that it meets at the depth of `hit` along `direction`, where `reaching` says which part of a

@@ -37,6 +37,11 @@ impl<const N: usize> Cubic<N> {
         self.0.iter().all(|texel| texel[N - 1] == 0.0)
     }
 
+    /// `1 - part` of this and `part` of the other.
+    pub fn lerp(&self, other: &Self, part: f64) -> Self {
+        Self(std::array::from_fn(|k| lerp(&self.0[k], &other.0[k], part)))
+    }
+
     /// The value at `x` in `0..=1`.
     pub fn at(&self, x: f64) -> Texel<N> {
         let y = 1.0 - x;
@@ -169,13 +174,13 @@ impl<'a, const N: usize> Lattice<'a, N> {
 
     fn load(&mut self, cell: DVec3) {
         let size = self.texels.size;
-        let first = self.base + cell;
+        let first = (self.base + cell).to_array().map(|texel| texel as i64);
         // [axis][near or far]
         let index: [[usize; 2]; 3] = std::array::from_fn(|axis| {
-            let count = f64::from(size[axis]);
-            [0.0, 1.0].map(|step| {
+            let count = i64::from(size[axis]);
+            [0, 1].map(|step| {
                 let texel = first[axis] + step;
-                let wrapped = if axis == 2 { texel.clamp(0.0, count - 1.0) } else { texel.rem_euclid(count) };
+                let wrapped = if axis == 2 { texel.clamp(0, count - 1) } else { texel.rem_euclid(count) };
                 wrapped as usize
             })
         });
