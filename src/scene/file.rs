@@ -132,6 +132,19 @@ pub struct VolumeSection {
     /// How texels are merged.
     #[serde(default)]
     pub filter: Filter,
+    /// What fills the shell besides.
+    pub haze: Option<HazeSection>,
+}
+
+/// `[volume.haze]`: a medium that is everywhere.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct HazeSection {
+    /// The opacity of a path as long as the shell is thick.
+    pub alpha: BelowOne,
+    /// By default white.
+    #[serde(default = "white")]
+    pub colour: Colour,
 }
 
 /// `[volume.density]`: the scalars of a file are densities.
@@ -356,7 +369,7 @@ recipe = "fog.toml"
                 found += 1;
             }
         }
-        assert_eq!(found, 4 + 8 + 5 + 2 + 3 + 10 + 2);
+        assert_eq!(found, 4 + 9 + 5 + 2 + 3 + 10 + 2);
         for (section, count) in [("light", 5), ("solid", 5)] {
             let text = Text::new("keys", format!("{SCENE}[[{section}]]\nunknown_key = 1"), &[]).unwrap();
             let message = text.parse::<SceneFile>(("mesh", "generator")).unwrap_err().to_string();

@@ -5,7 +5,7 @@ use std::path::Path;
 use glam::{DVec2, DVec3};
 
 use super::camera::DEFAULT_NEAR;
-use super::file::{CameraSection, Plan, SceneFile};
+use super::file::{CameraSection, HazeSection, Plan, SceneFile};
 use super::lighting::Lighting;
 use super::solids::Solids;
 use super::source::{MeshSource, VolumeSource};
@@ -15,7 +15,7 @@ use crate::frame::{Stage, Stopwatch};
 use crate::progress::{Progress, Silent};
 use crate::shell::{Shell, ShellOptions};
 use crate::value::{Exactly, Finite};
-use crate::volume::Pyramid;
+use crate::volume::{Haze, Pyramid};
 use crate::{Error, Result, input};
 
 /// A scene, with what its file says beyond it.
@@ -120,8 +120,14 @@ fn build(
             error.with_help(span::TooFine::HELP)
         })
     };
-    let volume = volume.load(&admit, &resolves)?;
+    let mut volume = volume.load(&admit, &resolves)?;
     let texel_along_w = options.thickness / f64::from(volume.size[2]);
+    let opacity_distance =
+        mean_free_path.or(section.opacity_distance.map(|distance| distance.0)).unwrap_or(texel_along_w);
+    if let Some(HazeSection { alpha, colour }) = &section.haze {
+        let depth = -(-alpha.0).ln_1p() * opacity_distance / options.thickness;
+        Haze { colour: colour.0, depth }.fill(&mut volume);
+    }
     stopwatch.lap("load.volume");
 
     let shading = lighting.map(|lighting| {
@@ -133,8 +139,6 @@ fn build(
     let shading = shading.transpose()?;
 
     progress.stage("filtering the volume");
-    let opacity_distance =
-        mean_free_path.or(section.opacity_distance.map(|distance| distance.0)).unwrap_or(texel_along_w);
     let texel = texel_edges(&shell, volume.size).map(|edge| edge / opacity_distance);
     let volume = Pyramid::build_with(volume, section.filter, texel);
     stopwatch.lap("load.pyramid");
@@ -244,6 +248,21 @@ recipe = "fog.toml"
         let mut v = scene.shell.texture[0].map(|uvw| uvw.y);
         v.sort_by(f64::total_cmp);
         assert!((v[3] - v[0] - 3.5 / 5.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn haze_has_the_opacity_that_is_asked_for_across_the_shell() {
+        let recipe = "recipe = \"uniform\"\nsize = [2, 2, 8]\nalpha = 0\n";
+        let folder = folder();
+        std::fs::write(folder.path().join("fog.toml"), recipe).unwrap();
+        for distance in ["", "opacity_distance = 0.7\n"] {
+            let text = format!("{SCENE}{distance}haze = {{ alpha = 0.6, colour = [0.5, 0, 0] }}\n");
+            let scene = parse("scene.toml", &text, folder.path()).unwrap().scene;
+            let [red, .., alpha] = scene.volume.levels[0].texels[0].map(f64::from);
+            let across = 1.0 - (1.0 - alpha).powf(0.1 / scene.medium.opacity_distance);
+            assert!((across - 0.6).abs() < 1e-6, "{across}");
+            assert!((red - 0.5 * alpha).abs() < 1e-6);
+        }
     }
 
     /// What is replaced in [`SCENE`] by what, the spot that must be underlined, a part of the message.

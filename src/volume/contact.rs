@@ -6,18 +6,18 @@ use super::{Quantity, Volume};
 use crate::frame::Image;
 
 /// Pixels between slices, and around all.
-const GAP: u32 = 8;
+pub(super) const GAP: u32 = 8;
 /// A side of a slice along w, the longer one, in pixels.
 const CELL: u32 = 144;
 /// The height of a line of text.
-const LINE: u32 = 12;
+pub(super) const LINE: u32 = 12;
 /// Slices along w in a row.
 const COLUMNS: u32 = 4;
 /// The most slices along w.
 const MOST_SLICES: u32 = 8;
 
 /// The sheet's own grey, and the checkerboard's two, linear.
-const PAPER: f32 = 0.02;
+pub(super) const PAPER: f32 = 0.02;
 const CHECKER: [f32; 2] = [0.12, 0.2];
 const INK: f32 = 0.7;
 
@@ -115,7 +115,7 @@ fn draw(
 }
 
 /// Writes ASCII, eight pixels a letter.
-fn write(sheet: &mut Image, text: &str, [left, top]: [u32; 2]) {
+pub(super) fn write(sheet: &mut Image, text: &str, [left, top]: [u32; 2]) {
     for (letter, x) in text.bytes().zip((left..).step_by(8)) {
         let glyph = BASIC_LEGACY[usize::from(letter & 0x7f)];
         for (row, y) in glyph.into_iter().zip(top..) {

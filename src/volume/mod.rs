@@ -3,6 +3,7 @@
 mod contact;
 mod directions;
 mod file;
+mod haze;
 mod interpretation;
 mod ktx2_file;
 mod loss;
@@ -12,18 +13,21 @@ mod raw;
 pub mod recipe;
 mod sample;
 mod stack;
+mod strip;
 mod transfer;
 pub mod voxelize;
 
 pub use contact::contact_sheet;
 pub use directions::{DirectionLevel, Directions};
 pub use file::{info, is_recipe, read, read_or_make};
+pub use haze::Haze;
 pub use interpretation::Interpretation;
 pub use ktx2_file::{write_raw, write_volume};
 pub use loss::Loss;
 pub use pyramid::Filter;
 pub use raw::{AlphaMode, ChannelRange, RawVolume, VolumeInfo};
 pub use sample::Sample;
+pub use strip::strip;
 pub use transfer::{ControlPoint, InvalidTransferFunction, TransferFunction};
 
 /// What the fourth channel of a [`Volume`] holds. It is interpolated as such.

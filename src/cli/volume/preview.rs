@@ -25,6 +25,8 @@ use super::super::progress::{Line, listen};
 /// through the middle of v, seen from the front, and of u, seen from the right. On the right is one tile on a plane, rendered by the
 /// `shell` method. Values of one channel are shown as white, from transparent for the least to opaque for the greatest; red, green and
 /// blue without alpha as opaque.
+///
+/// With --vary the slabs of a recipe and of its variations stand beside one another instead, each with what is varied below.
 #[derive(Args)]
 pub struct Arguments {
     /// A KTX2 or NRRD file, a folder or pattern of PNG slices, or a recipe (.toml)
@@ -35,6 +37,12 @@ pub struct Arguments {
     /// The slab's height in tile widths; by default the recipe's, or that of texels that are cubes
     #[arg(long, value_parser = height)]
     height: Option<f64>,
+    /// Lays a value over the recipe's: key=value
+    #[arg(short = 'D', value_name = "KEY=VALUE")]
+    overrides: Vec<String>,
+    /// Adds a variation: "key=value", or several with commas between them
+    #[arg(long, value_name = "KEY=VALUE,...")]
+    vary: Vec<String>,
     /// The device: its number in `mesoshell devices`, a part of its name, or its UUID
     #[arg(long)]
     device: Option<DeviceChoice>,
@@ -48,29 +56,55 @@ struct Previewed {
     height: u32,
 }
 
+/// Pixels along and up each slab of a strip.
+const STRIP: [u32; 2] = [232, 176];
+
 /// Linear grey behind the slab.
 const BACKGROUND: f32 = 0.12;
 
 /// # Errors
 /// The volume cannot be read, drawn or written.
 pub fn run(arguments: &Arguments, talk: Talk) -> Result<()> {
-    let Arguments { file: path, output, height, device } = arguments;
+    let Arguments { file: path, output, height, overrides, vary, device } = arguments;
     file::check_writable(output)?;
+    let is_plain = overrides.is_empty() && vary.is_empty();
+    if !is_plain && !volume::is_recipe(path) {
+        let message = format!("{} is no recipe: it has no keys for -D and --vary", path.display());
+        return Err(Error::Usage { message, help: Some("leave them out, or give a recipe (.toml)".into()) });
+    }
     let interrupt = Interrupt::default();
     listen(&interrupt);
     let progress: Arc<dyn Progress> = Arc::new(Line::new(talk));
-    progress.stage("loading the volume");
-    let (volume, own_height) = load(path)?;
-    interrupt.check()?;
-    let sheet = volume::contact_sheet(&volume);
-
-    let scene = slab(volume, height.unwrap_or(own_height), sheet.height)?;
     let device = device.clone().unwrap_or_default();
     let setup = Setup { device: &device, validation: None, progress: &progress, interrupt: &interrupt };
-    let view = scene.view;
-    let slab = METHODS[0].prepare(Arc::new(scene), &setup)?.render(&view)?.image;
+    let render = |scene: Scene| {
+        let view = scene.view;
+        Ok::<_, Error>(METHODS[0].prepare(Arc::new(scene), &setup)?.render(&view)?.image)
+    };
+    let loaded = |overrides: &[String]| {
+        progress.stage("loading the volume");
+        let (volume, own_height) = load(path, overrides)?;
+        interrupt.check()?;
+        Ok::<_, Error>((volume, height.unwrap_or(own_height)))
+    };
+    let picture = if vary.is_empty() {
+        let (volume, height) = loaded(overrides)?;
+        let sheet = volume::contact_sheet(&volume);
+        let slab = render(slab(volume, height, [sheet.height; 2])?)?;
+        beside(&sheet, &slab)
+    } else {
+        let own = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        let mut pictures = Vec::new();
+        for (label, variation) in
+            std::iter::once((own, None)).chain(vary.iter().map(|v| (v.clone(), Some(v))))
+        {
+            let overrides: Vec<String> = overrides.iter().chain(variation).cloned().collect();
+            let (volume, height) = loaded(&overrides)?;
+            pictures.push((label, render(slab(volume, height, STRIP)?)?));
+        }
+        volume::strip(&pictures, BACKGROUND)
+    };
     progress.stage("writing the picture");
-    let picture = beside(&sheet, &slab);
     file::write(output, &picture, Some([BACKGROUND; 3]))?;
     drop(progress); // The progress line is wiped before anything else is said.
     let told = Previewed { output: output.clone(), width: picture.width, height: picture.height };
@@ -78,9 +112,9 @@ pub fn run(arguments: &Arguments, talk: Talk) -> Result<()> {
 }
 
 /// The volume, and the height in tile widths for which it is meant.
-fn load(path: &Path) -> Result<(Volume, f64)> {
+fn load(path: &Path, overrides: &[String]) -> Result<(Volume, f64)> {
     if volume::is_recipe(path) {
-        let recipe = recipe::load(path)?;
+        let recipe = recipe::load_with(path, overrides)?;
         return Ok((recipe.build()?, f64::from(recipe.header().height)));
     }
     let raw = volume::read(path)?;
@@ -105,8 +139,8 @@ fn ramp(values: &[f32]) -> std::result::Result<TransferFunction, volume::Invalid
     TransferFunction::new(vec![point(least, 0.0), point(greatest, 1.0)])
 }
 
-/// One tile on a plane, seen from the front, a little from the right and above, in a square picture.
-fn slab(volume: Volume, height: f64, pixels: u32) -> Result<Scene> {
+/// One tile on a plane, seen from the front, a little from the right and above.
+fn slab(volume: Volume, height: f64, pixels: [u32; 2]) -> Result<Scene> {
     let [width, across, depth] = volume.size.map(f64::from);
     let plane = Plane { segments: 1, ..Plane::default() };
     let options = ShellOptions::new(height * plane.size);
@@ -118,9 +152,9 @@ fn slab(volume: Volume, height: f64, pixels: u32) -> Result<Scene> {
     let opacity_distance = options.thickness / depth;
     let shell = Shell::build(&mesh, &options)?;
     let mut scene = Scene::new(shell, Pyramid::build(volume), opacity_distance);
-    [scene.view.width, scene.view.height] = [pixels; 2];
-    // The slab fills less than the sphere around it.
-    scene.view.camera.fov_y *= 0.95;
+    [scene.view.width, scene.view.height] = pixels;
+    // The slab fills less than the sphere around it, and it is as wide whatever the picture's height.
+    scene.view.camera.fov_y *= 0.95 * f64::from(pixels[1]) / f64::from(pixels[0]);
     Ok(scene)
 }
 

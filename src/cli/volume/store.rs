@@ -41,6 +41,9 @@ pub struct Make {
     /// Texels along u, v, w, instead of the recipe's
     #[arg(long, value_name = "UxVxW", value_parser = super::size)]
     size: Option<[u32; 3]>,
+    /// Lays a value over the recipe's: key=value
+    #[arg(short = 'D', value_name = "KEY=VALUE")]
+    overrides: Vec<String>,
     #[command(flatten)]
     storage: Storage,
 }
@@ -64,9 +67,9 @@ pub struct Stored {
 }
 
 pub fn make(arguments: &Make, talk: Talk) -> Result<()> {
-    let Make { recipe: path, size, storage } = arguments;
+    let Make { recipe: path, size, overrides, storage } = arguments;
     storage.check()?;
-    let recipe = recipe::load(path)?;
+    let recipe = recipe::load_with(path, overrides)?;
     let made = recipe.build_with_size(size.unwrap_or(recipe.header().size))?;
     let stored = storage.write(&RawVolume::of(made, path, "recipe".into()))?;
     talk.result(&stored, || format!("{}\n{}", storage.output.display(), table(stored.rows())))

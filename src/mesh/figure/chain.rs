@@ -1,5 +1,7 @@
 //! The chain: links in turn flat and upright. Their pattern repeats every two units along X.
 
+use std::ops::Range;
+
 use glam::DVec3;
 
 use super::Sculpture;
@@ -10,12 +12,17 @@ const STRAIGHT: f64 = 0.44;
 const RING: f64 = 0.3;
 const WIRE: f64 = 0.115;
 
-pub(super) fn chain() -> Sculpture {
+/// After how many units the pattern repeats.
+pub(super) const PERIOD: f64 = 2.0;
+
+pub(super) fn chain(links: Range<i32>) -> Sculpture {
     let mut chain = Sculpture::new(0.02);
-    for (x, axis, colour) in
-        [(0.0, DVec3::new(0.0, 1.0, -1.0), 0xd0a54a), (1.0, DVec3::new(0.0, 1.0, 1.0), 0xc2c6cc)]
-    {
-        let centre = DVec3::new(x, RING + WIRE, 0.0);
+    for link in links {
+        let (axis, colour) = match link.rem_euclid(2) {
+            0 => (DVec3::new(0.0, 1.0, -1.0), 0xd0a54a),
+            _ => (DVec3::new(0.0, 1.0, 1.0), 0xc2c6cc),
+        };
+        let centre = DVec3::new(f64::from(link), RING + WIRE, 0.0);
         let shape =
             Shape::Link { centre, axis: axis.normalize(), straight: STRAIGHT, ring: RING, radius: WIRE };
         chain.add(shape, colour, 0.0);

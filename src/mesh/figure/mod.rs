@@ -10,8 +10,10 @@ mod sculpture;
 mod tetrahedra;
 mod tree;
 
+use std::ops::Range;
+
 use super::model::Model;
-use sculpture::Sculpture;
+pub(crate) use sculpture::Sculpture;
 
 /// A figure; all stand on the XZ plane, look along +Z and are some two units high.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -33,13 +35,22 @@ impl Figure {
 
     /// A closed mesh, whose finest parts are some thousandths of a unit.
     pub fn model(self) -> Model {
-        let sculpture = match self {
+        self.sculpture(0..2).model()
+    }
+
+    /// What the mesh is made from; of a chain the links `links`.
+    pub(crate) fn sculpture(self, links: Range<i32>) -> Sculpture {
+        match self {
             Self::Tree => tree::tree(),
-            Self::Chain => chain::chain(),
+            Self::Chain => chain::chain(links),
             Self::Bust => bust::bust(),
             Self::Dragon => dragon::dragon(),
-        };
-        sculpture.model()
+        }
+    }
+
+    /// After how many units along X it goes on as it began, if it does.
+    pub(crate) fn period(self) -> Option<f64> {
+        (self == Self::Chain).then_some(chain::PERIOD)
     }
 
     /// Its name.

@@ -99,16 +99,31 @@ struct Part {
 
 /// Parts, joined in order.
 #[derive(Debug, Clone)]
-pub(super) struct Sculpture {
+pub(crate) struct Sculpture {
     parts: Vec<Part>,
     /// The side of the cubes by which it is meshed.
     step: f64,
     /// How much it is darkened where it sees little of the sky, 0 to 1.
-    pub shade: f64,
+    pub(super) shade: f64,
+}
+
+/// What a sculpture is around a point that is near its surface.
+pub(crate) struct Place {
+    /// Negative inside; near the surface a distance, to first order.
+    pub field: f64,
+    /// How fast, and where to, that grows.
+    pub outward: DVec3,
+    /// Linear; without light.
+    pub colour: Vec3,
+    /// The part of the sky, 0 to 1, that is seen from the surface there.
+    pub sky: f64,
 }
 
 /// The shades that a colour is painted in.
 const SHADES: u32 = 24;
+
+/// How far a point looks for what hides the sky, in steps.
+const HORIZON: f64 = 12.0;
 
 impl Sculpture {
     /// Nothing yet, to be meshed by cubes with this side.
@@ -117,12 +132,12 @@ impl Sculpture {
     }
 
     /// Adds a part in the sRGB colour `0xrrggbb` that melts over `blend` units into what is there.
-    pub fn add(&mut self, shape: Shape, colour: u32, blend: f64) {
+    pub(super) fn add(&mut self, shape: Shape, colour: u32, blend: f64) {
         self.join(shape, colour, blend, false);
     }
 
     /// Takes a part away from what is there; what is laid bare has its colour.
-    pub fn carve(&mut self, shape: Shape, colour: u32, blend: f64) {
+    pub(super) fn carve(&mut self, shape: Shape, colour: u32, blend: f64) {
         self.join(shape, colour, blend, true);
     }
 
@@ -132,13 +147,13 @@ impl Sculpture {
     }
 
     /// Adds a part and its mirror image across X.
-    pub fn add_both(&mut self, shape: Shape, colour: u32, blend: f64) {
+    pub(super) fn add_both(&mut self, shape: Shape, colour: u32, blend: f64) {
         self.add(shape, colour, blend);
         self.add(mirrored(shape), colour, blend);
     }
 
     /// Takes a part and its mirror image across X away.
-    pub fn carve_both(&mut self, shape: Shape, colour: u32, blend: f64) {
+    pub(super) fn carve_both(&mut self, shape: Shape, colour: u32, blend: f64) {
         self.carve(shape, colour, blend);
         self.carve(mirrored(shape), colour, blend);
     }
@@ -154,7 +169,8 @@ impl Sculpture {
         }
     }
 
-    fn field(&self, point: DVec3) -> f64 {
+    /// Negative inside; near the surface a distance, to first order.
+    pub(crate) fn field(&self, point: DVec3) -> f64 {
         self.parts.iter().fold(f64::INFINITY, |field, part| {
             // What is farther than this changes nothing.
             let reach = part.blend + if part.is_carved { -field } else { field };
@@ -181,9 +197,9 @@ impl Sculpture {
     /// The part of the sky, 0 to 1, that is seen from a point of the surface: the field is as large as a distance from the surface
     /// where nothing else is near (A. Evans, *Fast Approximations for Global Illumination on Dynamic Scenes*, 2006).
     fn sky(&self, point: DVec3, normal: DVec3) -> f64 {
-        let open: f64 = [1.0, 2.0, 4.0, 8.0]
-            .map(|steps| {
-                let reach = 1.5 * steps * self.step;
+        let open: f64 = [0.125, 0.25, 0.5, 1.0]
+            .map(|part| {
+                let reach = part * self.horizon();
                 (self.field(point + reach * normal) / reach).clamp(0.0, 1.0)
             })
             .iter()
@@ -191,18 +207,52 @@ impl Sculpture {
         0.25 * open * (0.65 + 0.35 * normal.y)
     }
 
-    /// The mesh, painted.
-    pub fn model(&self) -> Model {
+    /// The parts that matter within `reach` of a point: there, and wherever the field is at most `reach`, it is the same.
+    pub(crate) fn around(&self, centre: DVec3, reach: f64) -> Self {
+        let is_near = |part: &&Part| {
+            let [low, high] = part.bounds;
+            centre.distance_squared(centre.clamp(low, high)) <= (2.0 * reach + part.blend).powi(2)
+        };
+        Self { parts: self.parts.iter().filter(is_near).copied().collect(), ..*self }
+    }
+
+    /// Whether there is nothing.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.parts.is_empty()
+    }
+
+    /// How far from a point [`Sculpture::place`] looks.
+    pub(crate) fn horizon(&self) -> f64 {
+        HORIZON * self.step
+    }
+
+    /// All that is known of the surroundings of a point near the surface.
+    pub(crate) fn place(&self, point: DVec3) -> Place {
+        let field = self.field(point);
+        let half = 0.25 * self.step;
+        let rise = |axis: DVec3| self.field(point + half * axis) - self.field(point - half * axis);
+        let outward = DVec3::new(rise(DVec3::X), rise(DVec3::Y), rise(DVec3::Z)) / (2.0 * half);
+        let normal = outward.normalize_or_zero();
+        let surface = point - field * normal;
+        Place { field, outward, colour: self.colour(surface), sky: self.sky(surface, normal) }
+    }
+
+    /// A box around it; nothing is below the ground.
+    pub(crate) fn bounds(&self) -> [DVec3; 2] {
         let start = [DVec3::INFINITY, DVec3::NEG_INFINITY];
         let [low, high] =
             self.parts.iter().filter(|part| !part.is_carved).fold(start, |[low, high], part| {
                 let bounds = part.shape.bounds();
                 [low.min(bounds[0] - part.blend), high.max(bounds[1] + part.blend)]
             });
+        [low.with_y(low.y.max(0.0)), high]
+    }
+
+    /// The mesh, painted.
+    pub fn model(&self) -> Model {
+        let [low, high] = self.bounds();
         let room = 2.0 * self.step;
-        // Nothing is below the ground.
         let ground = |point: DVec3| self.field(point).max(-point.y);
-        let low = low.with_y(low.y.max(0.0));
         let (positions, triangles) = tetrahedra::mesh(ground, [low - room, high + room], self.step);
 
         let colours: Vec<Vec3> = triangles

@@ -45,6 +45,10 @@ keys! {
         clumps: u32 = 9, 1..=256;
         /// How far the tips of a clump draw together: 0 not at all, 1 to a point.
         clumping: f32 = 0.7, 0.0..=1.0;
+        /// How far the fur gives way along a crease in the middle of u: 0 not at all, 1 down to the skin.
+        crease: f32 = 0.0, 0.0..=1.0;
+        /// How far the crease reaches to either side, in tile widths.
+        crease_width: f32 = 0.12, 0.01..=0.5;
         /// Opacity, over one voxel, of what strands fill entirely.
         opacity: f32 = 0.92, 0.0..=0.98;
         /// How dark the fur is at its roots: 0 as bright as at the tips, 1 black.
@@ -91,11 +95,15 @@ impl Fur {
         let clump_turn = random(clump.id, seed ^ 0x7a) * 2. - 1.;
 
         let shorter = self.length_variation * (0.6 * clump_height * clump_height + 0.4 * spread(1.).abs());
-        let top = height * self.length * (1. - shorter);
+        let to_crease = root.x - root.x.floor() - 0.5;
+        let creased = self.crease * smoothstep(self.crease_width, 0., to_crease.abs());
+        let top = height * self.length * (1. - shorter) * (1. - 0.9 * creased);
         let swirl = gradient((root * 2.).extend(0.5), [2; 2], seed);
         let stray = self.direction_variation.to_radians() * (0.35 * clump_turn + 1.2 * swirl + spread(0.25));
         let leaning =
             Vec2::from_angle(self.direction.to_radians() + stray) * self.lean * top * (1. + spread(0.2));
+        // What is beside the crease was combed away from it.
+        let aside = Vec2::X * to_crease.signum() * creased * 1.2 * height;
         let phase = TAU * random(clump.id, seed ^ 0x33) + spread(0.8);
         let brightness = 1. + self.colour_variation * (0.5 * clump_turn + spread(0.7));
 
@@ -103,7 +111,7 @@ impl Fur {
             let t = point as f32 / (POINTS - 1) as f32;
             let angle = phase + TAU * self.curl_turns * t;
             let curl = self.curl * t * (Vec2::from_angle(angle) - Vec2::from_angle(phase));
-            let across = root + leaning * t.powf(1.6) + to_clump * self.clumping * t * t + curl;
+            let across = root + (leaning + aside) * t.powf(1.6) + to_clump * self.clumping * t * t + curl;
             across.extend(top * t)
         });
         Hair { strand: Strand { points }, brightness }

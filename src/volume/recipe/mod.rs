@@ -14,6 +14,7 @@
 mod chain_mail;
 mod clouds;
 mod ellipsoids;
+mod figure;
 mod fog;
 mod fur;
 mod grass;
@@ -25,6 +26,7 @@ mod rocks;
 mod scales;
 mod strand;
 mod trees;
+mod uniform;
 mod weave;
 
 use std::collections::BTreeMap;
@@ -40,6 +42,7 @@ use toml::de::{DeTable, DeValue, ValueDeserializer};
 pub use chain_mail::ChainMail;
 pub use clouds::Clouds;
 pub use ellipsoids::Ellipsoids;
+pub use figure::Figure;
 pub use fog::Fog;
 pub use fur::Fur;
 pub use grass::Grass;
@@ -47,6 +50,7 @@ pub use height_map::HeightMap;
 pub use rocks::Rocks;
 pub use scales::Scales;
 pub use trees::Trees;
+pub use uniform::Uniform;
 pub use weave::Weave;
 
 use super::{Quantity, Volume};
@@ -63,6 +67,7 @@ const RECIPES: &[(&str, Reader)] = &[
     ("chain-mail", read_pattern::<ChainMail>),
     ("clouds", read_pattern::<Clouds>),
     ("ellipsoids", read_pattern::<Ellipsoids>),
+    ("figure", |source, table| Ok(Arc::new(figure::read(source, table)?))),
     ("fog", read_pattern::<Fog>),
     ("fur", read_pattern::<Fur>),
     ("grass", read_pattern::<Grass>),
@@ -70,6 +75,7 @@ const RECIPES: &[(&str, Reader)] = &[
     ("rocks", read_pattern::<Rocks>),
     ("scales", read_pattern::<Scales>),
     ("trees", read_pattern::<Trees>),
+    ("uniform", read_pattern::<Uniform>),
     ("weave", read_pattern::<Weave>),
 ];
 
@@ -109,9 +115,20 @@ pub struct Recipe {
 /// # Errors
 /// [`Error::Input`] where the file cannot be read, else as [`parse`].
 pub fn load(path: impl AsRef<Path>) -> Result<Recipe> {
+    load_with(path, &[])
+}
+
+/// Reads a recipe from a file, with overrides laid over it, each `key = value`, or several with commas between them.
+///
+/// # Errors
+/// As [`load`], and [`Error::Usage`] for an override that is no TOML.
+pub fn load_with(path: impl AsRef<Path>, overrides: &[String]) -> Result<Recipe> {
     let path = path.as_ref();
-    let text =
+    let mut text =
         input::text(path).map_err(|error| Error::input(path, format!("cannot read the recipe: {error}")))?;
+    for written in overrides {
+        text = overridden(&text, written)?;
+    }
     let folder = path.parent().unwrap_or(Path::new("")).to_path_buf();
     parse_in(folder, &path.display().to_string(), &text)
 }
@@ -124,6 +141,42 @@ pub fn load(path: impl AsRef<Path>) -> Result<Recipe> {
 /// [`Error::Input`] where a file that the recipe names cannot be read.
 pub fn parse(name: &str, text: &str) -> Result<Recipe> {
     parse_in(PathBuf::new(), name, text)
+}
+
+/// A recipe's text in which the values of the keys that `written` names are those that it gives them.
+fn overridden(text: &str, written: &str) -> Result<String> {
+    let as_table = |body: &str| format!("{{{body}}}");
+    // A bare word stands for a string.
+    let bare = written.split_once('=').map(|(key, value)| as_table(&format!("{key}={:?}", value.trim())));
+    let readable = [Some(as_table(written)), bare].into_iter().flatten().find(|body| {
+        let document = format!("all={body}");
+        DeTable::parse(&document).is_ok()
+    });
+    let Some(body) = readable else {
+        let message = format!("`{written}` cannot be laid over a recipe: it is no `key = value`");
+        return Err(Error::Usage {
+            message,
+            help: Some("write it as TOML, such as \"length = 0.5, curl = 0\"".into()),
+        });
+    };
+    let document = format!("all={body}");
+    let mut overridden = text.to_owned();
+    let mut added = String::new();
+    // Both were read just now, or will be complained of when the whole is.
+    let (Ok(own), Ok(over)) = (DeTable::parse(text), DeTable::parse(&document)) else {
+        return Ok(overridden);
+    };
+    let all = over.get_ref().get("all").map(Spanned::get_ref);
+    let Some(DeValue::Table(keys)) = all else { return Ok(overridden) };
+    for (key, value) in keys {
+        if let Some((old_key, old_value)) = own.get_ref().get_key_value(key.get_ref().as_ref()) {
+            // Blanks leave all other keys where they are.
+            let gap = old_key.span().start..old_value.span().end;
+            overridden.replace_range(gap.clone(), &" ".repeat(gap.len()));
+        }
+        added += &format!("\n{} = {}", key.get_ref(), &document[value.span()]);
+    }
+    Ok(overridden + &added + "\n")
 }
 
 /// The same with the folder to which the files that the recipe names are relative.
