@@ -285,7 +285,7 @@ fn ring() -> Scene {
     let options = ShellOptions { uv_scale: DVec2::new(6.0, 2.0), ..ShellOptions::new(0.3) };
     let shell = Shell::build(&mesh, &options).unwrap();
     let texel = |i: u32| {
-        let alpha = if (i / 3 ^ i / 32) & 1 == 0 { 0.5 } else { 0.03 };
+        let alpha = if ((i / 3) ^ (i / 32)) & 1 == 0 { 0.5 } else { 0.03 };
         [0.9 * alpha, 0.7 * alpha, 0.4 * alpha, alpha]
     };
     let volume = Volume::new([8, 8, 4], (0..256).map(texel).collect()).unwrap();
