@@ -7,8 +7,8 @@ use std::sync::Arc;
 use glam::{DVec2, DVec3};
 use mesoshell::Error;
 use mesoshell::gpu::{
-    Batch, Buffer, DeviceChoice, Draw, Gpu, Messages, Pipeline, PipelineInfo, Target, Texture3d, devices,
-    draw, shaders,
+    Batch, Buffer, DeviceChoice, Draw, Gpu, Keeps, Messages, Pipeline, PipelineInfo, Sampled, Target,
+    Texture3d, devices, draw, shaders,
 };
 use mesoshell::mesh::Mesh;
 use mesoshell::mesh::generate::{Generator, Sphere};
@@ -36,12 +36,13 @@ fn empty(size: [u32; 3]) -> Pyramid {
 /// The pipeline of the sorted tetrahedra.
 fn shell_pipeline(push_constant_bytes: u32) -> PipelineInfo<'static> {
     PipelineInfo {
-        vertex: shaders::SHELL_VERT,
-        fragment: shaders::SHELL_FRAG,
+        vertex: shaders::SHELL_VERT.with(&[]),
+        fragment: shaders::SHELL_FRAG.with(&[]),
         constants: &[],
-        storage_buffers: 3,
-        textures: 1,
+        storage_buffers: &[0, 1, 2],
+        textures: &[8],
         push_constant_bytes,
+        keeps: Keeps::Blend,
     }
 }
 
@@ -147,10 +148,15 @@ fn a_draw_whose_parts_do_not_fit_reaches_no_device() {
         let volume = Texture3d::upload(gpu, "the volume", &empty([1, 1, 1])).unwrap();
         let draws = |target: &Target, buffers: &[&Buffer], bytes: usize| {
             let batches = [Batch { pipeline: &pipeline, vertices: 0..0 }];
-            let push_constants = &vec![0; bytes];
-            let textures = &[&volume];
-            let between = &|_| Ok(());
-            let parts = Draw { target, buffers, textures, push_constants, batches: &batches, between };
+            let parts = Draw {
+                target,
+                clears: true,
+                buffers: &(0..).zip(buffers.iter().copied()).collect::<Vec<_>>(),
+                textures: &[(8, Sampled::Texture(&volume))],
+                push_constants: &vec![0; bytes],
+                batches: &batches,
+                between: &|_| Ok(()),
+            };
             catch_unwind(AssertUnwindSafe(|| draw(&parts).unwrap())).is_ok()
         };
         let (own, foreign) = (buffer(gpu), buffer(&other));
@@ -160,6 +166,9 @@ fn a_draw_whose_parts_do_not_fit_reaches_no_device() {
         assert!(!draws(&target(gpu, 1), &[&own; 3], bytes - 4), "push constants are missing");
         assert!(!draws(&target(&other, 1), &[&own; 3], bytes), "another device's target");
         assert!(!draws(&target(gpu, 1), &[&own, &own, &foreign], bytes), "another device's buffer");
+        let nearest = Target::sampled(gpu, "surfaces", [4, 4], 1, true).unwrap();
+        let wrong = || Pipeline::new(gpu, &nearest, &shell_pipeline(bytes as u32));
+        assert!(catch_unwind(AssertUnwindSafe(wrong)).is_err(), "a target that keeps the nearest");
     });
 }
 

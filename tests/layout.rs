@@ -7,6 +7,8 @@ use mesoshell::gpu::shaders::{self, Spirv};
 use mesoshell::method::shell::ViewConstants;
 use mesoshell::method::shell::lit::{Frame, LightSource, Lighting, LitCell};
 use mesoshell::method::shell::seen::{Cell, Tile};
+use mesoshell::method::shell::shadows::{Blocker, LightPicture};
+use mesoshell::method::shell::solids::Triangle;
 use rspirv::binary::parse_words;
 use rspirv::dr::{Instruction, Loader, Module, Operand};
 use rspirv::spirv::{Decoration, Op};
@@ -73,18 +75,28 @@ macro_rules! host {
     };
 }
 
-const UNLIT: [Spirv; 4] =
-    [shaders::SHELL_FRAG, shaders::SHELL_DEPTH_FRAG, shaders::CYCLE_FRAG, shaders::CYCLE_DEPTH_FRAG];
-const LIT: [Spirv; 4] = [
-    shaders::SHELL_LIT_FRAG,
-    shaders::SHELL_LIT_DEPTH_FRAG,
-    shaders::CYCLE_LIT_FRAG,
-    shaders::CYCLE_LIT_DEPTH_FRAG,
-];
+/// The fragment shaders of the shell: in every variant that is lit, or that is not.
+fn of_the_shell(lit: bool) -> Vec<Spirv> {
+    let sets: [&[&str]; 4] = [&[], &["DEPTH"], &["SOLIDS"], &["SOLIDS", "DEPTH"]];
+    let lights: &[&[&str]] = if lit { &[&["LIT"], &["LIT", "SHADOWS"]] } else { &[&[]] };
+    let mut found = Vec::new();
+    for family in [&shaders::SHELL_FRAG, &shaders::CYCLE_FRAG] {
+        for set in sets {
+            found.extend(lights.iter().map(|light| family.with(&[set, light].concat())));
+        }
+    }
+    found
+}
+
+/// The fragment shaders that read the pictures of lights.
+fn shadowed() -> Vec<Spirv> {
+    let on = ["LIT", "SHADOWS"];
+    [&shaders::SHELL_FRAG, &shaders::CYCLE_FRAG, &shaders::SOLID_FRAG].map(|family| family.with(&on)).to_vec()
+}
 
 #[test]
 fn structs_of_lit_scenes_agree() {
-    for shader in LIT {
+    for shader in of_the_shell(true) {
         let (members, stride) = layout(shader, "LitCell");
         assert_eq!(
             (members, stride),
@@ -95,9 +107,10 @@ fn structs_of_lit_scenes_agree() {
         let (members, stride) = layout(shader, "LightSource");
         assert_eq!(
             (members, stride),
-            (host!(LightSource: place, colour), Some(size_of::<LightSource>() as u32))
+            (host!(LightSource: place, colour, pictures), Some(size_of::<LightSource>() as u32))
         );
-        let mut lighting = host!(Lighting: world_from_view, ambient, diffuse, specular, shininess, count);
+        let mut lighting =
+            host!(Lighting: world_from_view, ambient, diffuse, specular, shininess, count, glow, glow_from);
         lighting.push(("sources".to_owned(), size_of::<Lighting>() as u32));
         assert_eq!(layout(shader, "Lighting").0, lighting);
     }
@@ -117,42 +130,92 @@ fn bindings(shader: Spirv) -> Vec<u32> {
     bindings
 }
 
-/// An unlit scene's shaders have nothing of what light needs: they are what they were before there was any.
+/// What a scene has nothing of is not compiled in.
 #[test]
-fn nothing_of_light_is_compiled_in_where_a_scene_is_unlit() {
+fn nothing_is_compiled_in_that_a_scene_does_not_need() {
     let words = |shader: Spirv| String::from_utf8_lossy(bytemuck::cast_slice(shader.words())).into_owned();
-    for (unlit, lit) in UNLIT.into_iter().zip(LIT) {
-        for name in ["radiant", "frames", "lighting", "directions", "FIBRE"] {
-            assert!(!words(unlit).contains(name) && words(lit).contains(name), "{name}");
+    let of_light: &[&str] = &["radiant", "frames", "lighting", "directions", "FIBRE", "GLOW"];
+    let of_shadows: &[&str] = &["light_pictures", "curve_0", "let_through"];
+    let of_solids: &[&str] = &["solid_depth", "solid_depths"];
+    let of_depth: &[&str] = &["out_depth"];
+    for family in [&shaders::SHELL_FRAG, &shaders::CYCLE_FRAG] {
+        let switches =
+            [("LIT", of_light), ("SHADOWS", of_shadows), ("SOLIDS", of_solids), ("DEPTH", of_depth)];
+        for (switch, names) in switches {
+            let base: &[&str] = if switch == "SHADOWS" { &["LIT"] } else { &[] };
+            let (without, with) = (words(family.with(base)), words(family.with(&[base, &[switch]].concat())));
+            for name in names {
+                assert!(!without.contains(name) && with.contains(name), "{switch}: {name}");
+            }
         }
     }
-    assert_eq!(bindings(shaders::SHELL_FRAG), [3]);
-    assert_eq!(bindings(shaders::SHELL_LIT_FRAG), [3, 4, 5, 6, 7]);
-    assert_eq!(bindings(shaders::CYCLE_FRAG), [0, 2, 3]);
-    assert_eq!(bindings(shaders::CYCLE_LIT_FRAG), [0, 2, 3, 4, 5, 6, 7]);
+    let shell = |on: &[&str]| bindings(shaders::SHELL_FRAG.with(on));
+    assert_eq!(shell(&[]), [8]);
+    assert_eq!(shell(&["SOLIDS"]), [8, 15]);
+    assert_eq!(shell(&["LIT"]), [3, 4, 5, 8, 9]);
+    assert_eq!(shell(&["LIT", "SHADOWS"]), [3, 4, 5, 6, 8, 9, 10, 11, 12, 13]);
+    assert_eq!(shell(&["LIT", "SHADOWS", "SOLIDS"]), [3, 4, 5, 6, 8, 9, 10, 11, 12, 13, 14, 15]);
+    assert_eq!(bindings(shaders::CYCLE_FRAG.with(&[])), [0, 2, 8]);
+    assert_eq!(bindings(shaders::CYCLE_FRAG.with(&["LIT"])), [0, 2, 3, 4, 5, 8, 9]);
 }
 
 #[test]
 fn shell_structs_agree() {
     let constants = host!(ViewConstants: centre, pixel, near, texels, last_level, lod_scale, per_opacity_distance, step, samples);
-    // The vertex shader reads no constants, but the fragment shaders do.
-    for shader in UNLIT.into_iter().chain(LIT) {
+    // The shell's vertex shader reads no constants, but the fragment shaders do.
+    let others = [
+        shaders::SHADOW_FRAG.with(&[]),
+        shaders::SOLID_FRAG.with(&[]),
+        shaders::SOLID_VERT.with(&[]),
+        shaders::BLOCKER_VERT.with(&[]),
+    ];
+    for shader in of_the_shell(false).into_iter().chain(of_the_shell(true)).chain(others) {
         assert_eq!(layout(shader, "View").0, constants);
     }
-    let (members, stride) = layout(shaders::SHELL_VERT, "Cell");
+    let (members, stride) = layout(shaders::SHELL_VERT.with(&[]), "Cell");
     assert_eq!(members, host!(Cell: outline, planes, texture));
     assert_eq!(stride, Some(size_of::<Cell>() as u32));
-    for shader in [shaders::SHELL_LIT_VERT, shaders::CYCLE_FRAG, shaders::CYCLE_LIT_FRAG] {
+    let others = [
+        shaders::SHELL_VERT.with(&["LIT"]),
+        shaders::CYCLE_FRAG.with(&[]),
+        shaders::CYCLE_FRAG.with(&["LIT"]),
+        shaders::SHADOW_FRAG.with(&[]),
+    ];
+    for shader in others {
         assert_eq!(layout(shader, "Cell"), (members.clone(), stride));
     }
-    let (members, stride) = layout(shaders::CYCLE_VERT, "Tile");
-    assert_eq!(members, host!(Tile: bounds, members));
-    assert_eq!(stride, Some(size_of::<Tile>() as u32));
+    for on in [&[][..], &["LIGHT"]] {
+        let (members, stride) = layout(shaders::TILE_VERT.with(on), "Tile");
+        assert_eq!(members, host!(Tile: bounds, members, picture));
+        assert_eq!(stride, Some(size_of::<Tile>() as u32));
+    }
+}
+
+#[test]
+fn structs_of_solids_and_shadows_agree() {
+    for shader in
+        [shaders::SOLID_VERT.with(&[]), shaders::SOLID_FRAG.with(&[]), shaders::SOLID_FRAG.with(&["LIT"])]
+    {
+        let (members, stride) = layout(shader, "Triangle");
+        assert_eq!(members, host!(Triangle: corners, plane, texture, normal, facing, colour));
+        assert_eq!(stride, Some(size_of::<Triangle>() as u32));
+    }
+    let (members, stride) = layout(shaders::BLOCKER_VERT.with(&[]), "Blocker");
+    assert_eq!(members, host!(Blocker: corners, depth_function, picture));
+    assert_eq!(stride, Some(size_of::<Blocker>() as u32));
+    let others =
+        [shaders::SHADOW_FRAG, shaders::BLOCKER_VERT, shaders::BLOCKER_FRAG].map(|family| family.with(&[]));
+    for shader in shadowed().into_iter().chain(others) {
+        let (members, stride) = layout(shader, "LightPicture");
+        let expected =
+            host!(LightPicture: from_world, middle, half_side, pixel, is_parallel, opacity_distances);
+        assert_eq!((members, stride), (expected, Some(size_of::<LightPicture>() as u32)));
+    }
 }
 
 #[test]
 fn a_wrong_member_is_noticed() {
-    let (mut members, _) = layout(shaders::SHELL_VERT, "Cell");
+    let (mut members, _) = layout(shaders::SHELL_VERT.with(&[]), "Cell");
     assert_eq!(members.len(), 3);
     members[1].1 += 4;
     assert_ne!(members, host!(Cell: outline, planes, texture));

@@ -23,8 +23,9 @@ layout(set = 0, binding = 5, std430) readonly buffer Lighting {
 #include "shadows.glsl"
 #endif
 
-// The light that reaches a point, and the unit vector towards it.
-vec3 arriving(LightSource light, vec3 point, out vec3 to_light) {
+// The light that reaches a point, and the unit vector towards it. Its shadow is that of a point `off` it, which is off a surface
+// that would else cast a shadow on itself.
+vec3 arriving(LightSource light, vec3 point, vec3 off, out vec3 to_light) {
     vec3 colour = light.colour.rgb;
     if (light.colour.w == 0.0) {
         to_light = light.place.xyz;
@@ -36,7 +37,7 @@ vec3 arriving(LightSource light, vec3 point, out vec3 to_light) {
         colour /= 1.0 + falls * falls;
     }
 #ifdef SHADOWS
-    colour *= let_through(light.pictures, point);
+    colour *= let_through(light.pictures, point + off);
 #endif
     return colour;
 }

@@ -37,7 +37,7 @@ vec4 radiant(Path path, float depth) {
     vec3 mirrored = vec3(0.0);
     for (uint i = 0; i < lighting.count; i++) {
         vec3 to_light;
-        vec3 light = arriving(lighting.sources[i], depth * ray, to_light);
+        vec3 light = arriving(lighting.sources[i], depth * ray, vec3(0.0), to_light);
         float along = dot(direction, to_light);
         float aligned;
         float lobe;

@@ -11,14 +11,20 @@ use crate::scene::{Light, Model, Scene, Shading, Solid, Source, View};
 use crate::volume::{DirectionLevel, Quantity, Volume};
 
 /// The code that a cached reference comes from: were it changed, so might its pictures be.
-const REFERENCE_CODE: [(&str, &str); 7] = [
+const REFERENCE_CODE: [(&str, &str); 13] = [
     ("crossing.rs", include_str!("../reference/crossing.rs")),
+    ("hierarchy.rs", include_str!("../reference/hierarchy.rs")),
     ("integrate.rs", include_str!("../reference/integrate.rs")),
+    ("layer.rs", include_str!("../reference/layer.rs")),
     ("mod.rs", include_str!("../reference/mod.rs")),
+    ("penumbra.rs", include_str!("../reference/penumbra.rs")),
     ("quadrature.rs", include_str!("../reference/quadrature.rs")),
     ("shade.rs", include_str!("../reference/shade.rs")),
+    ("shadow.rs", include_str!("../reference/shadow.rs")),
+    ("solids.rs", include_str!("../reference/solids.rs")),
     ("supersample.rs", include_str!("../reference/supersample.rs")),
     ("texture.rs", include_str!("../reference/texture.rs")),
+    ("umbra.rs", include_str!("../reference/umbra.rs")),
 ];
 
 /// What of a scene the reference asks for: rays, and the density of texels across them.

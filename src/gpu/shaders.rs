@@ -12,7 +12,7 @@ impl Spirv {
 }
 
 /// A shader in all of its variants: what a scene does not need is not compiled in.
-#[derive(Debug)]
+#[derive(Debug, Clone, Copy)]
 pub struct Family {
     /// What can be compiled in or left out.
     pub switches: &'static [&'static str],

@@ -1,31 +1,28 @@
 //! Which tetrahedra a ray crosses, and from where to where.
 //!
 //! A tetrahedron is the set where its four barycentric coordinates are not negative. Along a ray each is a
-//! linear function of depth, so the tetrahedron's interval is found by clipping with four
-//! half-spaces; everything is measured from the eye, so that a scene far from the origin loses nothing.
+//! linear function of the distance, so the tetrahedron's interval is found by clipping with four
+//! half-spaces; everything is measured from the eye, so that a scene far from the origin loses nothing. Rays to a light start
+//! elsewhere, and read the same planes.
 //!
 //! Two neighbours read their shared face from one plane, so the exit of one *is* the entry of the other,
 //! bit for bit (Woop, Benthin, Wald, *Watertight Ray/Triangle Intersection*, 2013). A ray that lies in a
 //! face or along an edge is put on one side of it as if the whole ray were shifted a little in
-//! one fixed direction across the picture: it is inside one of the tetrahedra there, not none or two.
+//! one fixed direction across it: it is inside one of the tetrahedra there, not none or two.
 
-use bvh::aabb::{Aabb, Bounded};
-use bvh::bounding_hierarchy::BHShape;
-use bvh::bvh::Bvh;
-use bvh::ray::Ray;
 use glam::DVec3;
 
-use crate::scene::View;
+use super::hierarchy::{Hierarchy, Path};
 use crate::shell::{EXTERIOR, Shell};
 
-/// The part of a ray in one tetrahedron.
+/// The part of a path in one tetrahedron, in the path's own measure: on an eye's ray, in depth.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Crossing {
     /// Its index in the shell.
     pub tetrahedron: usize,
-    /// Depth at which the ray enters it, at least the near depth.
+    /// Where the path enters it, at least the path's own beginning.
     pub enter: f64,
-    /// Depth at which the ray leaves it, greater than `enter`.
+    /// Where the path leaves it, greater than `enter`.
     pub exit: f64,
 }
 
@@ -36,28 +33,22 @@ struct Plane {
     at_eye: f64,
     /// Distance from the eye to the vertex from which `at_eye` was measured: its rounding grows with it.
     reach: f64,
+    /// Slopes per world unit up to this are taken for none.
+    steepness: f64,
 }
 
-/// Finds the tetrahedra on a ray.
+/// Finds the tetrahedra on a path.
 pub struct Crossings {
     planes: Vec<[Plane; 4]>,
-    boxes: Vec<PaddedBox>,
-    hierarchy: Bvh<f64, 3>,
-    near: f64,
-    /// Where a ray that lies in a face is thought to be shifted; in general position to the picture's axes.
-    aside: DVec3,
+    hierarchy: Hierarchy,
 }
 
 /// A ray is in a plane if it stays within this angle of it, in radians: a thousand roundings.
 const EDGE_ON: f64 = 1e-13;
 
-/// Boxes grow by this part of the largest coordinate, so that rounding loses no tetrahedron.
-const BOX_PADDING: f64 = 1e-9;
-
 impl Crossings {
-    /// Prepares a shell to be seen from one eye. Tetrahedra of zero volume are left out.
-    pub fn new(shell: &Shell, view: &View) -> Self {
-        let (eye, frame) = (view.camera.eye, view.camera.frame());
+    /// Prepares a shell for paths that are measured from this eye. Tetrahedra of zero volume are left out.
+    pub fn new(shell: &Shell, eye: DVec3) -> Self {
         let mut planes: Vec<[Plane; 4]> = Vec::with_capacity(shell.cells.len());
         for tetrahedron in 0..shell.cells.len() {
             let own = std::array::from_fn(|face| match shared_plane(shell, &planes, tetrahedron, face) {
@@ -66,57 +57,62 @@ impl Crossings {
             });
             planes.push(own);
         }
-        let mut boxes: Vec<PaddedBox> = (0..shell.cells.len())
-            .filter(|&tetrahedron| shell.cells[tetrahedron].has_maps())
-            .map(|tetrahedron| {
-                let vertices = shell.topology.tetrahedra[tetrahedron]
-                    .map(|vertex| shell.vertices[vertex as usize] - eye);
-                PaddedBox::around(&vertices, tetrahedron)
-            })
-            .collect();
-        // The hierarchy compares areas and extents with absolute limits: it is built at unit scale.
-        let reach = boxes.iter().map(PaddedBox::reach).fold(f64::MIN_POSITIVE, f64::max);
-        boxes.iter_mut().for_each(|bounds| bounds.finish(reach));
-        let hierarchy = Bvh::build(&mut boxes);
-        let aside = 0.618 * frame.right + 0.786 * frame.up;
-        Self { planes, boxes, hierarchy, near: view.camera.near, aside }
+        let with_maps = (0..shell.cells.len()).filter(|&tetrahedron| shell.cells[tetrahedron].has_maps());
+        let hulls = with_maps.map(|tetrahedron| {
+            let vertices = shell.topology.tetrahedra[tetrahedron];
+            (tetrahedron, vertices.map(|vertex| shell.vertices[vertex as usize] - eye))
+        });
+        let hierarchy = Hierarchy::new(hulls);
+        Self { planes, hierarchy }
     }
 
-    /// Replaces the content of `crossings` by those of the ray from the eye, where
-    /// `direction` is scaled to unit depth; in order of entry.
-    pub fn find(&self, direction: DVec3, crossings: &mut Vec<Crossing>) {
+    /// Replaces the content of `crossings` by those of the path, in order of entry.
+    pub fn find(&self, path: &Path, crossings: &mut Vec<Crossing>) {
         crossings.clear();
-        let ray = Ray::new([0.0; 3].into(), direction.to_array().into());
-        for bounds in self.hierarchy.traverse(&ray, &self.boxes) {
-            let tetrahedron = bounds.tetrahedron;
-            if let Some((enter, exit)) = self.clip(tetrahedron, direction) {
-                crossings.push(Crossing { tetrahedron, enter, exit });
-            }
-        }
+        self.visit(path, |crossing| {
+            crossings.push(crossing);
+            true
+        });
         crossings
             .sort_unstable_by(|a, b| a.enter.total_cmp(&b.enter).then(a.tetrahedron.cmp(&b.tetrahedron)));
     }
 
-    fn clip(&self, tetrahedron: usize, direction: DVec3) -> Option<(f64, f64)> {
-        let (mut enter, mut exit) = (self.near, f64::INFINITY);
-        for plane in &self.planes[tetrahedron] {
-            let slope = plane.gradient.dot(direction);
-            let steepness = EDGE_ON * plane.gradient.length();
-            if slope.abs() <= steepness * direction.length() && plane.at_eye.abs() <= steepness * plane.reach
+    /// Calls `found` with the crossings of the path, in any order, until it returns false.
+    pub fn visit(&self, path: &Path, mut found: impl FnMut(Crossing) -> bool) {
+        let start_reach = path.start.length();
+        self.hierarchy.visit(path, |tetrahedron, end| {
+            if let Some((enter, exit)) = self.clip(tetrahedron, path, start_reach)
+                && !found(Crossing { tetrahedron, enter, exit })
             {
-                if plane.gradient.dot(self.aside) <= 0.0 {
+                *end = f64::NEG_INFINITY;
+            }
+        });
+    }
+
+    fn clip(&self, tetrahedron: usize, path: &Path, start_reach: f64) -> Option<(f64, f64)> {
+        let unit = path.direction.length();
+        let (mut enter, mut exit) = (path.from, f64::INFINITY);
+        for plane in &self.planes[tetrahedron] {
+            let slope = plane.gradient.dot(path.direction);
+            let at_start = plane.at_eye + plane.gradient.dot(path.start);
+            if slope.abs() <= plane.steepness * unit
+                && at_start.abs() <= plane.steepness * (plane.reach + start_reach)
+            {
+                if plane.gradient.dot(path.aside) <= 0.0 {
                     return None;
                 }
             } else if slope == 0.0 {
-                if plane.at_eye < 0.0 {
+                if at_start < 0.0 {
                     return None;
                 }
             } else {
-                let depth = -plane.at_eye / slope;
-                if slope > 0.0 { enter = enter.max(depth) } else { exit = exit.min(depth) }
+                let place = -at_start / slope;
+                if slope > 0.0 { enter = enter.max(place) } else { exit = exit.min(place) }
             }
         }
-        (enter < exit && exit.is_finite()).then_some((enter, exit))
+        let is_bounded = exit.is_finite();
+        exit = exit.min(path.to);
+        (is_bounded && enter < exit).then_some((enter, exit))
     }
 }
 
@@ -124,7 +120,8 @@ fn own_plane(shell: &Shell, eye: DVec3, tetrahedron: usize, face: usize) -> Plan
     let gradient = shell.cells[tetrahedron].gradients[face];
     let on_face = shell.topology.tetrahedra[tetrahedron][(face + 1) % 4];
     let from_vertex = eye - shell.vertices[on_face as usize];
-    Plane { gradient, at_eye: gradient.dot(from_vertex), reach: from_vertex.length() }
+    let steepness = EDGE_ON * gradient.length();
+    Plane { gradient, at_eye: gradient.dot(from_vertex), reach: from_vertex.length(), steepness }
 }
 
 /// The plane of a face that a tetrahedron of lower index shares, turned to this tetrahedron's side.
@@ -146,50 +143,8 @@ fn shared_plane(shell: &Shell, planes: &[[Plane; 4]], tetrahedron: usize, face: 
     })?;
     let plane = planes[neighbour][back];
     let gradient = shell.cells[tetrahedron].gradients[face];
-    let turned = Plane { gradient: -plane.gradient, at_eye: -plane.at_eye, reach: plane.reach };
+    let turned = Plane { gradient: -plane.gradient, at_eye: -plane.at_eye, ..plane };
     Some(if gradient.dot(plane.gradient) < 0.0 { turned } else { plane })
-}
-
-/// A tetrahedron's bounds relative to the eye.
-struct PaddedBox {
-    tetrahedron: usize,
-    min: DVec3,
-    max: DVec3,
-    node: usize,
-}
-
-impl PaddedBox {
-    fn around(vertices: &[DVec3; 4], tetrahedron: usize) -> Self {
-        let [min, max] = [DVec3::min, DVec3::max].map(|pick| vertices.iter().copied().reduce(pick));
-        let (min, max) = (min.unwrap_or_default(), max.unwrap_or_default());
-        Self { tetrahedron, min, max, node: 0 }
-    }
-
-    fn reach(&self) -> f64 {
-        self.min.abs().max(self.max.abs()).max_element()
-    }
-
-    fn finish(&mut self, unit: f64) {
-        let padding = DVec3::splat(BOX_PADDING * self.reach());
-        self.min = (self.min - padding) / unit;
-        self.max = (self.max + padding) / unit;
-    }
-}
-
-impl Bounded<f64, 3> for PaddedBox {
-    fn aabb(&self) -> Aabb<f64, 3> {
-        Aabb::with_bounds(self.min.to_array().into(), self.max.to_array().into())
-    }
-}
-
-impl BHShape<f64, 3> for PaddedBox {
-    fn set_bh_node_index(&mut self, node: usize) {
-        self.node = node;
-    }
-
-    fn bh_node_index(&self) -> usize {
-        self.node
-    }
 }
 
 #[cfg(test)]
@@ -198,7 +153,7 @@ mod tests {
 
     use super::*;
     use crate::mesh::generate::{Generator, Torus};
-    use crate::scene::Camera;
+    use crate::scene::{Camera, View};
     use crate::shell::ShellOptions;
 
     #[test]
@@ -209,11 +164,11 @@ mod tests {
         let camera = Camera { eye, target: DVec3::ZERO, up: DVec3::Y, fov_y: 0.7, near: 0.1 };
         let view = View { camera, width: 40, height: 40, depth: false };
         let mismatches = |shell: &Shell| {
-            let crossings = Crossings::new(shell, &view);
+            let crossings = Crossings::new(shell, eye);
             let (mut list, mut shared, mut mismatches) = (Vec::new(), 0, 0);
             for i in 0..1600 {
                 let point = DVec2::new(f64::from(i % 40), f64::from(i / 40));
-                crossings.find(view.ray_at_unit_depth(point), &mut list);
+                crossings.find(&Path::of_eye(&view, view.ray_at_unit_depth(point)), &mut list);
                 for pair in list.windows(2) {
                     // The torus is seen through twice, with a gap.
                     if pair[1].enter - pair[0].exit < 1e-6 {

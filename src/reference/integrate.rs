@@ -1,7 +1,7 @@
 //! The integral along one ray: `C = integral of T sigma c`, `T = exp(-integral of sigma)`, front to back.
 //!
-//! The ray is cut where the set of tetrahedra changes, where a level of detail is an integer, and at the
-//! planes of texel centres. On the *pieces* between, the premultiplied texture is a cubic (a smooth blend of
+//! The ray is cut where the set of tetrahedra changes, where a level of detail is an integer, where the shadow of a solid begins or
+//! ends, and at the planes of texel centres. On the *pieces* between, the premultiplied texture is a cubic (a smooth blend of
 //! two, between levels), and `sigma` is smooth unless alpha reaches 1. A *panel* is a piece, or
 //! a binary fraction of one: extinction and emission are taken at the nodes of [`Rule`], the optical depth
 //! at each node is the integral of the interpolant of `sigma`, and the colour follows with
@@ -24,9 +24,12 @@
 use glam::DVec3;
 
 use super::crossing::Crossing;
+use super::layer::{Layer, Ray, Width};
 use super::quadrature::{AtNodes, NODES, Rule, dot};
 use super::shade::{Lit, Surroundings};
-use super::texture::{ALPHA, CLEAR, Cubic, Lattice, Texel};
+use super::shadow::ShadowsOnRay;
+use super::solids::Hit;
+use super::texture::{ALPHA, CLEAR, Texel};
 use super::{Counts, Reference, Sample};
 use crate::scene::Scene;
 use crate::volume::Quantity;
@@ -37,19 +40,9 @@ const NARROWEST: f64 = 1e-15;
 /// The share of the tolerance that every panel may use, however short it is.
 const SHARE_OF_EACH: f64 = 1e-5;
 
-/// One tetrahedron's medium along a span in which its levels do not change.
-struct Layer<'a> {
-    /// The level of detail at depth `z` is `log2(detail * z)`.
-    detail: f64,
-    /// The finer level in play.
-    level: f64,
-    fine: Lattice<'a>,
-    /// The next level, if the level of detail lies between the two.
-    coarse: Option<Lattice<'a>>,
-    /// Of the current piece.
-    fine_cubic: Cubic,
-    coarse_cubic: Cubic,
-    /// In a lit scene.
+/// A layer of the medium, and in a lit scene what it takes to shade it.
+struct LitLayer<'a> {
+    medium: Layer<'a>,
     surroundings: Option<Surroundings<'a>>,
 }
 
@@ -78,16 +71,15 @@ pub(super) struct RayIntegral<'a> {
     scene: &'a Scene,
     lit: Option<&'a Lit<'a>>,
     rule: &'a Rule,
-    direction: DVec3,
+    ray: Ray,
     /// World units per unit depth.
     stretch: f64,
-    eye: DVec3,
-    detail_per_texel: f64,
     tolerance: f64,
     brightness: f64,
     /// In depth, summed over tetrahedra.
     total_length: f64,
-    layers: Vec<Layer<'a>>,
+    layers: Vec<LitLayer<'a>>,
+    shadows: ShadowsOnRay<'a>,
     transmittance: f64,
     colour: [f64; 3],
     alpha: f64,
@@ -97,24 +89,31 @@ pub(super) struct RayIntegral<'a> {
 }
 
 impl<'a> RayIntegral<'a> {
-    /// The integral over `crossings`, which are in order of entry.
+    /// The integral over `crossings`, which are in order of entry, and end where the ray meets a solid.
     pub(super) fn evaluate(
         reference: &'a Reference<'a>,
         direction: DVec3,
         crossings: &[Crossing],
+        solid: Option<&Hit>,
     ) -> (Sample, Counts) {
+        let ray = Ray {
+            eye: reference.view.camera.eye,
+            start: DVec3::ZERO,
+            direction,
+            width: Width { at_start: 0.0, slope: 1.0 },
+            detail_per_texel: reference.lod_footprint * reference.view.pixel_at_unit_depth(),
+        };
         let mut integral = Self {
             scene: reference.scene,
             lit: reference.lit.as_ref(),
             rule: &reference.rule,
-            direction,
+            ray,
             stretch: direction.length(),
-            eye: reference.view.camera.eye,
-            detail_per_texel: reference.lod_footprint * reference.view.pixel_at_unit_depth(),
-            tolerance: reference.tolerance,
+            tolerance: reference.panels_tolerance(),
             brightness: reference.brightness,
             total_length: crossings.iter().map(|crossing| crossing.exit - crossing.enter).sum(),
             layers: Vec::new(),
+            shadows: ShadowsOnRay::new(reference, direction, crossings),
             transmittance: 1.0,
             colour: [0.0; 3],
             alpha: 0.0,
@@ -122,12 +121,16 @@ impl<'a> RayIntegral<'a> {
             counts: Counts { rays: 1, ..Counts::default() },
         };
         integral.sweep(crossings);
+        if let Some(hit) = solid {
+            integral.stop_at_solid(hit);
+        }
         let [r, g, b] = integral.colour;
         let distance = integral.moment / integral.alpha * integral.stretch;
         let sample = Sample {
             rgba: [r, g, b, integral.alpha.min(1.0)],
             depth: if integral.alpha > 0.0 { distance } else { f64::INFINITY },
         };
+        integral.counts.shadow_paths = integral.shadows.paths();
         (sample, integral.counts)
     }
 
@@ -158,21 +161,13 @@ impl<'a> RayIntegral<'a> {
         self.transmittance * self.brightness < 1e-3 * self.tolerance
     }
 
-    /// Cuts a segment where a level of detail is an integer.
+    /// Cuts a segment where a level of detail is an integer, and where a solid's shadow begins or ends.
     fn segment(&mut self, from: f64, to: f64, active: &[Crossing]) {
-        let last_level = self.scene.volume.levels.len() - 1;
-        let details: Vec<f64> = active
-            .iter()
-            .map(|crossing| {
-                self.detail_per_texel * self.scene.texels_across(crossing.tetrahedron, self.direction)
-            })
-            .collect();
+        let details: Vec<f64> =
+            active.iter().map(|crossing| self.ray.detail(self.scene, crossing.tetrahedron)).collect();
         let mut start = from;
         while start < to && !self.is_done() {
-            let integer_levels = details
-                .iter()
-                .flat_map(|detail| (0..=last_level).map(move |level| (level as f64).exp2() / detail));
-            let end = integer_levels.filter(|&depth| depth > start).fold(to, f64::min);
+            let end = self.ray.span_end(self.scene, &details, start, to).min(self.shadows.next_edge(start));
             self.layers.clear();
             for (crossing, &detail) in active.iter().zip(&details) {
                 let layer = self.layer(crossing.tetrahedron, detail, start, 0.5 * (start + end));
@@ -183,31 +178,10 @@ impl<'a> RayIntegral<'a> {
         }
     }
 
-    fn layer(&self, tetrahedron: usize, detail: f64, start: f64, middle: f64) -> Layer<'a> {
-        let shell = &self.scene.shell;
-        let levels = &self.scene.volume.levels;
-        let first_vertex = shell.vertices[shell.topology.tetrahedra[tetrahedron][0] as usize];
-        let texture_from_world = shell.cells[tetrahedron].texture_from_world;
-        let from_vertex = (self.eye - first_vertex) + start * self.direction;
-        let texture = shell.texture[tetrahedron][0] + texture_from_world * from_vertex;
-        let slope = texture_from_world * self.direction;
-        let last = levels.len() - 1;
-        let level_of_detail = (detail * middle).log2().clamp(0.0, last as f64);
-        let level = level_of_detail as usize;
-        let is_between = level_of_detail > 0.0 && level < last;
-        Layer {
-            detail,
-            level: level as f64,
-            fine: Lattice::new(&levels[level], texture, slope),
-            coarse: is_between.then(|| Lattice::new(&levels[level + 1], texture, slope)),
-            fine_cubic: Cubic::EMPTY,
-            coarse_cubic: Cubic::EMPTY,
-            surroundings: self.lit.map(|lit| {
-                let lattice = |level: usize| Lattice::new(&lit.directions().levels[level], texture, slope);
-                let coarse = is_between.then(|| lattice(level + 1));
-                lit.surroundings(tetrahedron, self.eye, self.direction, lattice(level), coarse)
-            }),
-        }
+    fn layer(&self, tetrahedron: usize, detail: f64, start: f64, middle: f64) -> LitLayer<'a> {
+        let medium = Layer::new(self.scene, &self.ray, tetrahedron, detail, start, middle);
+        let surroundings = self.lit.map(|lit| lit.surroundings(tetrahedron, &self.ray, &medium));
+        LitLayer { medium, surroundings }
     }
 
     /// Visits the pieces of a span with its layers, front to back.
@@ -215,12 +189,11 @@ impl<'a> RayIntegral<'a> {
         let length = end - start;
         let mut from = 0.0;
         while from < length && !self.is_done() {
-            let lattices = self.layers.iter_mut().flat_map(Layer::lattices);
-            let to = lattices.fold(length, |to, lattice| to.min(lattice.next_crossing()));
+            let to = self.layers.iter().fold(length, |to, layer| layer.medium.piece_end(to));
             if from < to {
                 self.piece(start, from, to);
             }
-            self.layers.iter_mut().flat_map(Layer::lattices).for_each(|lattice| lattice.pass(to));
+            self.layers.iter_mut().for_each(|layer| layer.medium.pass(to));
             from = from.max(to);
         }
     }
@@ -235,7 +208,7 @@ impl<'a> RayIntegral<'a> {
         }
         let piece = Piece { start: span_start + from, length: to - from };
         let can_be_wall = self.scene.volume.levels[0].quantity == Quantity::Opacity;
-        if can_be_wall && self.layers.iter().any(Layer::is_wall) {
+        if can_be_wall && self.layers.iter().any(|layer| layer.medium.is_wall()) {
             self.stop_at_wall(piece.start);
         } else {
             self.panels(piece, 0.0, 1.0);
@@ -244,14 +217,31 @@ impl<'a> RayIntegral<'a> {
 
     /// What reaches a wall sees the wall's colour at that point; of several, their mean.
     fn stop_at_wall(&mut self, depth: f64) {
-        let walls: Vec<_> = self.layers.iter().filter(|layer| layer.is_wall()).collect();
+        let Self { layers, shadows, colour, .. } = self;
+        let walls: Vec<_> = layers.iter().filter(|layer| layer.medium.is_wall()).collect();
         let part = self.transmittance / walls.len() as f64;
         for layer in walls {
-            let texel = layer.radiant(self.lit, 0.0, depth);
-            for (sum, premultiplied) in self.colour.iter_mut().zip(texel) {
+            let texel = layer.radiant(self.lit, 0.0, depth, |light| shadows.traced(light, depth));
+            for (sum, premultiplied) in colour.iter_mut().zip(texel) {
                 *sum += part * premultiplied;
             }
         }
+        self.stop(depth);
+    }
+
+    /// What reaches a solid sees its colour.
+    fn stop_at_solid(&mut self, hit: &Hit) {
+        if !self.is_done() {
+            let colour = self.shadows.colour_of_solid(hit);
+            for (sum, colour) in self.colour.iter_mut().zip(colour.to_array()) {
+                *sum += self.transmittance * colour;
+            }
+        }
+        self.stop(hit.place);
+    }
+
+    /// Takes away what is left at a depth.
+    fn stop(&mut self, depth: f64) {
         self.alpha += self.transmittance;
         self.moment += self.transmittance * depth;
         self.transmittance = 0.0;
@@ -290,8 +280,11 @@ impl<'a> RayIntegral<'a> {
         let mut emission: [AtNodes; 3] = [[0.0; NODES]; 3];
         for i in 0..NODES {
             let x = low + width * rule.nodes[i];
+            let z = piece.start + x * piece.length;
             for layer in &self.layers {
-                let texel = layer.radiant(self.lit, x, piece.start + x * piece.length);
+                let shadows = &mut self.shadows;
+                let reaching = |light| shadows.interpolated(light, z, self.transmittance);
+                let texel = layer.radiant(self.lit, x, z, reaching);
                 let per_alpha = match quantity {
                     Quantity::Opacity => extinction_per_alpha(texel[ALPHA], texel[CLEAR]),
                     Quantity::Extinction => 1.0,
@@ -331,48 +324,26 @@ impl<'a> RayIntegral<'a> {
     }
 }
 
-impl<'a> Layer<'a> {
-    fn lattices<'b>(&'b mut self) -> impl Iterator<Item = &'b mut Lattice<'a>> {
-        std::iter::once(&mut self.fine).chain(self.coarse.as_mut())
-    }
-
+impl LitLayer<'_> {
     /// Loads the cubics of a piece; whether there is anything in it.
     fn load(&mut self, from: f64, to: f64) -> bool {
-        let fine = self.fine.cubic(from, to);
-        let coarse = self.coarse.as_mut().and_then(|lattice| lattice.cubic(from, to));
-        self.fine_cubic = fine.unwrap_or(Cubic::EMPTY);
-        self.coarse_cubic = coarse.unwrap_or(Cubic::EMPTY);
         if let Some(surroundings) = &mut self.surroundings {
             surroundings.load(from, to);
         }
-        fine.is_some() || coarse.is_some()
-    }
-
-    fn is_wall(&self) -> bool {
-        self.fine_cubic.is_wall() && (self.coarse.is_none() || self.coarse_cubic.is_wall())
+        self.medium.load(from, to)
     }
 
     /// The texture at `x` (0..1) of the piece, at depth `z`, its colour as it is lit.
-    fn radiant(&self, lit: Option<&Lit<'_>>, x: f64, z: f64) -> Texel {
-        let texel = self.blend(z, || self.fine_cubic.at(x), || self.coarse_cubic.at(x));
+    fn radiant(&self, lit: Option<&Lit<'_>>, x: f64, z: f64, reaching: impl FnMut(usize) -> f64) -> Texel {
+        let texel = self.medium.at(x, z);
         match (lit, &self.surroundings) {
             (Some(lit), Some(surroundings)) if texel[ALPHA] > 0.0 => {
-                let direction = self.blend(z, || surroundings.fine.at(x), || surroundings.coarse.at(x));
-                lit.shade(&texel, &direction, surroundings, z)
+                let direction =
+                    self.medium.blend(z, || surroundings.fine.at(x), || surroundings.coarse.at(x));
+                lit.shade(&texel, &direction, surroundings, z, reaching)
             }
             _ => texel,
         }
-    }
-
-    /// Of a value in the finer level and in the coarser one that at the level of detail at depth `z`.
-    fn blend(&self, z: f64, fine: impl Fn() -> Texel, coarse: impl Fn() -> Texel) -> Texel {
-        let fine = fine();
-        if self.coarse.is_none() {
-            return fine;
-        }
-        let coarse = coarse();
-        let part = ((self.detail * z).log2() - self.level).clamp(0.0, 1.0);
-        std::array::from_fn(|c| (1.0 - part) * fine[c] + part * coarse[c])
     }
 }
 

@@ -39,6 +39,24 @@ const KRONROD: [f64; 8] = [
 const GAUSS: [f64; 4] =
     [0.129_484_966_168_869_7, 0.279_705_391_489_276_7, 0.381_830_050_505_118_9, 0.417_959_183_673_469_4];
 
+/// Nodes of the short rule on `0..1`, Gauss-Kronrod 3-7.
+pub const SHORT_NODES: [f64; 7] = [
+    0.019_754_365_645_990_3,
+    0.112_701_665_379_258_3,
+    0.282_878_125_326_598_7,
+    0.5,
+    0.717_121_874_673_401_3,
+    0.887_298_334_620_741_7,
+    0.980_245_634_354_009_7,
+];
+
+/// Its weights, exact to degree 11: of each two nodes that mirror each other, from the outermost, and of the middle.
+pub const SHORT_WEIGHTS: [f64; 4] =
+    [0.052_328_113_013_233_7, 0.134_244_044_934_166_7, 0.200_698_707_387_981_1, 0.225_458_269_329_237_1];
+
+/// The same, exact to degree 5 only.
+pub const SHORT_COARSE_WEIGHTS: [f64; 4] = [0.0, 5.0 / 18.0, 0.0, 4.0 / 9.0];
+
 /// A rule for functions on the interval `0..1`.
 #[derive(Debug, Clone)]
 pub struct Rule {
@@ -107,6 +125,17 @@ mod tests {
             assert!(monomial_error(&rule.coarse_weights, degree) < ROUNDING, "degree {degree}");
         }
         assert!(monomial_error(&rule.coarse_weights, 14) > 10.0 * ROUNDING);
+    }
+
+    #[test]
+    fn the_short_rule_is_exact_to_its_degree_and_not_beyond() {
+        let error = |weights: &[f64; 4], degree: i32| {
+            let terms = (0..7).map(|i: usize| weights[i.min(6 - i)] * SHORT_NODES[i].powi(degree));
+            (terms.sum::<f64>() - 1.0 / f64::from(degree + 1)).abs()
+        };
+        assert!((0..=11).all(|degree| error(&SHORT_WEIGHTS, degree) < ROUNDING));
+        assert!((0..=5).all(|degree| error(&SHORT_COARSE_WEIGHTS, degree) < ROUNDING));
+        assert!(error(&SHORT_WEIGHTS, 12) > 1e-8 && error(&SHORT_COARSE_WEIGHTS, 6) > 1e-4);
     }
 
     #[test]

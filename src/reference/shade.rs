@@ -4,10 +4,10 @@ use std::f64::consts::FRAC_PI_4;
 
 use glam::{DMat3, DVec3};
 
+use super::layer::{Layer, Ray};
 use super::texture::{ALPHA, Cubic, Lattice, Texel};
 use crate::scene::{Light, Model, Scene, Shading, Source};
 use crate::shell::{Frames, Shell};
-use crate::volume::Directions;
 
 /// A lit scene.
 pub struct Lit<'a> {
@@ -40,37 +40,35 @@ impl<'a> Lit<'a> {
         Some(Self { shading, shell: &scene.shell, frames })
     }
 
-    /// Normals or tangents.
-    pub fn directions(&self) -> &'a Directions {
-        &self.shading.directions
-    }
-
-    /// For a ray from `eye` in one tetrahedron, where the directions come from these levels.
-    pub fn surroundings(
-        &self,
-        tetrahedron: usize,
-        eye: DVec3,
-        direction: DVec3,
-        fine_lattice: Lattice<'a>,
-        coarse_lattice: Option<Lattice<'a>>,
-    ) -> Surroundings<'a> {
-        let at_eye = self.shell.barycentric(tetrahedron, eye);
-        let per_depth = self.shell.cells[tetrahedron].gradients.map(|gradient| gradient.dot(direction));
+    /// Along the span of a layer, in its tetrahedron.
+    pub fn surroundings(&self, tetrahedron: usize, ray: &Ray, layer: &Layer<'_>) -> Surroundings<'a> {
+        let at_eye = self.shell.barycentric(tetrahedron, ray.eye);
+        let per_depth = self.shell.cells[tetrahedron].gradients.map(|gradient| gradient.dot(ray.direction));
+        let levels = &self.shading.directions.levels;
+        let lattice = |level: usize| Lattice::new(&levels[level], layer.texture, layer.texture_slope);
         Surroundings {
-            fine_lattice,
-            coarse_lattice,
+            fine_lattice: lattice(layer.level),
+            coarse_lattice: layer.is_between().then(|| lattice(layer.level + 1)),
             fine: Cubic::EMPTY,
             coarse: Cubic::EMPTY,
             frame_at_eye: self.frames.at(tetrahedron, at_eye),
             frame_per_depth: self.frames.at(tetrahedron, per_depth),
-            eye,
-            direction,
+            eye: ray.eye,
+            direction: ray.direction,
         }
     }
 
-    /// The texel as it is lit: its alpha, and the premultiplied colour that it sends to the eye.
-    pub fn shade(&self, texel: &Texel, vector: &Texel, surroundings: &Surroundings<'_>, depth: f64) -> Texel {
-        let Shading { model, ambient, diffuse, specular, shininess, lights, .. } = self.shading;
+    /// The texel as it is lit: its alpha, and the premultiplied colour that it sends to the eye, where `reaching` says which part
+    /// of a light that casts shadows reaches it.
+    pub fn shade(
+        &self,
+        texel: &Texel,
+        vector: &Texel,
+        surroundings: &Surroundings<'_>,
+        depth: f64,
+        mut reaching: impl FnMut(usize) -> f64,
+    ) -> Texel {
+        let Shading { model, ambient, diffuse, specular, shininess, emission, lights, .. } = self.shading;
         let point = surroundings.eye + depth * surroundings.direction;
         let to_eye = -surroundings.direction.normalize();
         let [x, y, z, weight, _] = *vector;
@@ -79,8 +77,8 @@ impl<'a> Lit<'a> {
         let direction = (frame * in_texture).normalize_or_zero();
         let agreement = if direction == DVec3::ZERO { 0.0 } else { (in_texture.length() / weight).min(1.0) };
         let (mut scattered, mut mirrored) = (*ambient, DVec3::ZERO);
-        for light in lights {
-            let (arriving, to_light) = arriving(light, point);
+        for (number, light) in lights.iter().enumerate() {
+            let (mut arriving, to_light) = arriving(light, point);
             let (aligned, lobe, mean) = match model {
                 Model::Surface => {
                     let facing = direction.dot(to_light).max(0.0);
@@ -95,10 +93,17 @@ impl<'a> Lit<'a> {
                     (across, off_cone.max(0.0).powf(*shininess), FRAC_PI_4)
                 }
             };
-            scattered += arriving * (diffuse * (agreement * aligned + (1.0 - agreement) * mean));
-            mirrored += arriving * (specular * agreement * lobe);
+            let scatter = diffuse * (agreement * aligned + (1.0 - agreement) * mean);
+            let mirror = specular * agreement * lobe;
+            if light.shadow && scatter + mirror > 0.0 {
+                arriving *= reaching(number);
+            }
+            scattered += arriving * scatter;
+            mirrored += arriving * mirror;
         }
         let alpha = texel[ALPHA];
+        let brightest = texel[0].max(texel[1]).max(texel[2]) / alpha;
+        scattered += emission.glow * ((brightest - emission.from) / (1.0 - emission.from)).clamp(0.0, 1.0);
         let mut lit = *texel;
         for channel in 0..3 {
             lit[channel] = texel[channel] * scattered[channel] + alpha * mirrored[channel];
@@ -107,8 +112,8 @@ impl<'a> Lit<'a> {
     }
 }
 
-/// The light that reaches a point, and the unit vector towards it. What stands between the two would be asked here.
-fn arriving(light: &Light, point: DVec3) -> (DVec3, DVec3) {
+/// The light that reaches a point where nothing stands between the two, and the unit vector towards it.
+pub fn arriving(light: &Light, point: DVec3) -> (DVec3, DVec3) {
     match light.source {
         Source::Directional { towards } => (light.colour, towards),
         Source::Point { position, falloff } => {

@@ -12,7 +12,8 @@ use glam::DVec3;
 use crate::volume::{DirectionLevel, Volume};
 
 /// Premultiplied red, green, blue, then alpha, then `1 - alpha`; or of directions x, y, z times their weight, then the weight.
-pub type Texel = [f64; 5];
+/// Whoever needs less reconstructs the last few of them: two are alpha and `1 - alpha`.
+pub type Texel<const N: usize = 5> = [f64; N];
 
 /// Index of alpha in a [`Texel`].
 pub const ALPHA: usize = 3;
@@ -21,19 +22,28 @@ pub const CLEAR: usize = 4;
 
 /// A texel cubic over a piece of a ray, in Bernstein form over `0..1`.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Cubic(pub [Texel; 4]);
+pub struct Cubic<const N: usize = 5>(pub [Texel<N>; 4]);
 
-impl Cubic {
+impl<const N: usize> Cubic<N> {
     /// Neither colour nor opacity anywhere.
-    pub const EMPTY: Self = Self([[0.0, 0.0, 0.0, 0.0, 1.0]; 4]);
+    pub const EMPTY: Self = {
+        let mut texel = [0.0; N];
+        texel[N - 1] = 1.0;
+        Self([texel; 4])
+    };
 
     /// Whether alpha is 1 all along the piece.
     pub fn is_wall(&self) -> bool {
-        self.0.iter().all(|texel| texel[CLEAR] == 0.0)
+        self.0.iter().all(|texel| texel[N - 1] == 0.0)
+    }
+
+    /// `1 - part` of this and `part` of the other.
+    pub fn lerp(&self, other: &Self, part: f64) -> Self {
+        Self(std::array::from_fn(|k| lerp(&self.0[k], &other.0[k], part)))
     }
 
     /// The value at `x` in `0..=1`.
-    pub fn at(&self, x: f64) -> Texel {
+    pub fn at(&self, x: f64) -> Texel<N> {
         let y = 1.0 - x;
         let basis = [y * y * y, 3.0 * x * y * y, 3.0 * x * x * y, x * x * x];
         std::array::from_fn(|c| (0..4).map(|k| basis[k] * self.0[k][c]).sum())
@@ -63,7 +73,7 @@ impl<'a> From<&'a DirectionLevel> for Texels<'a> {
 
 /// Where a ray meets the texel lattice of one level: visited cell by cell, front to back.
 #[derive(Debug, Clone)]
-pub struct Lattice<'a> {
+pub struct Lattice<'a, const N: usize = 5> {
     texels: Texels<'a>,
     /// The texel whose centre is the origin of `start`, before wrapping.
     base: DVec3,
@@ -77,11 +87,11 @@ pub struct Lattice<'a> {
     crossing: DVec3,
     /// The loaded cell, relative to `base`.
     cell: DVec3,
-    corners: [Texel; 8],
+    corners: [Texel<N>; 8],
     corners_are_empty: bool,
 }
 
-impl<'a> Lattice<'a> {
+impl<'a, const N: usize> Lattice<'a, N> {
     /// For a span that starts at the texture-space point `start` and moves by `slope` per unit depth.
     pub fn new(texels: impl Into<Texels<'a>>, start: DVec3, slope: DVec3) -> Self {
         let texels = texels.into();
@@ -101,7 +111,7 @@ impl<'a> Lattice<'a> {
             plane,
             crossing: DVec3::INFINITY,
             cell: DVec3::NAN,
-            corners: [[0.0; 5]; 8],
+            corners: [[0.0; N]; 8],
             corners_are_empty: true,
         };
         (0..3).for_each(|axis| lattice.find_crossing(axis));
@@ -119,6 +129,11 @@ impl<'a> Lattice<'a> {
         self.crossing.min_element()
     }
 
+    /// The number of cells that the ray passes on its way, along the axis on which they are most.
+    pub fn cells_along(&self, length: f64) -> f64 {
+        (self.slope * length).abs().max_element()
+    }
+
     /// Passes all planes up to `depth`.
     pub fn pass(&mut self, depth: f64) {
         for axis in 0..3 {
@@ -130,7 +145,7 @@ impl<'a> Lattice<'a> {
     }
 
     /// The reconstruction between two depths within one cell, whatever was passed; `None` where it is empty.
-    pub fn cubic(&mut self, from: f64, to: f64) -> Option<Cubic> {
+    pub fn cubic(&mut self, from: f64, to: f64) -> Option<Cubic<N>> {
         let cell = (self.start + self.slope * (0.5 * (from + to))).floor();
         if cell != self.cell {
             self.load(cell);
@@ -151,7 +166,7 @@ impl<'a> Lattice<'a> {
             }
         }
         // The blossom of a product of three linear functions: means over the corners with k far axes.
-        let mean = |[i, j, k]: [usize; 3]| -> Texel {
+        let mean = |[i, j, k]: [usize; 3]| -> Texel<N> {
             std::array::from_fn(|c| (corners[i][c] + corners[j][c] + corners[k][c]) / 3.0)
         };
         Some(Cubic([corners[0], mean([1, 2, 4]), mean([3, 5, 6]), corners[7]]))
@@ -159,13 +174,13 @@ impl<'a> Lattice<'a> {
 
     fn load(&mut self, cell: DVec3) {
         let size = self.texels.size;
-        let first = self.base + cell;
+        let first = (self.base + cell).to_array().map(|texel| texel as i64);
         // [axis][near or far]
         let index: [[usize; 2]; 3] = std::array::from_fn(|axis| {
-            let count = f64::from(size[axis]);
-            [0.0, 1.0].map(|step| {
+            let count = i64::from(size[axis]);
+            [0, 1].map(|step| {
                 let texel = first[axis] + step;
-                let wrapped = if axis == 2 { texel.clamp(0.0, count - 1.0) } else { texel.rem_euclid(count) };
+                let wrapped = if axis == 2 { texel.clamp(0, count - 1) } else { texel.rem_euclid(count) };
                 wrapped as usize
             })
         });
@@ -174,14 +189,16 @@ impl<'a> Lattice<'a> {
         self.corners = std::array::from_fn(|corner| {
             let [u, v, w] = std::array::from_fn(|axis| index[axis][(corner >> axis) & 1]);
             let [r, g, b, a] = self.texels.values[u + v * row + w * slice].map(f64::from);
-            [r, g, b, a, 1.0 - a]
+            let all = [r, g, b, a, 1.0 - a];
+            std::array::from_fn(|c| all[all.len() - N + c])
         });
-        self.corners_are_empty = self.corners.iter().all(|texel| texel[..=ALPHA] == [0.0; 4]);
+        self.corners_are_empty =
+            self.corners.iter().all(|texel| texel[..N - 1].iter().all(|channel| *channel == 0.0));
         self.cell = cell;
     }
 }
 
-fn lerp(a: &Texel, b: &Texel, x: f64) -> Texel {
+fn lerp<const N: usize>(a: &Texel<N>, b: &Texel<N>, x: f64) -> Texel<N> {
     std::array::from_fn(|c| (1.0 - x) * a[c] + x * b[c])
 }
 
@@ -226,7 +243,7 @@ mod tests {
             let start = if ray % 4 == 0 { DVec3::new(0.7, -0.5, 0.375) } else { vector() };
             let slope =
                 if ray % 3 == 0 { DVec3::AXES[ray % 9 / 3] * (0.5 - (ray % 2) as f64) } else { vector() };
-            let mut lattice = Lattice::new(&volume, start, slope);
+            let mut lattice: Lattice = Lattice::new(&volume, start, slope);
             let (mut from, mut cells) = (0.0, 0);
             while from < 1.0 {
                 let to = lattice.next_crossing().min(1.0);
@@ -259,7 +276,7 @@ mod tests {
             texels: [0.0, 0.0, 1.0, 1.0].map(layer).to_vec(),
             quantity: Quantity::Opacity,
         };
-        let mut lattice = Lattice::new(&volume, DVec3::new(0.1, 0.2, 0.0), DVec3::Z);
+        let mut lattice: Lattice = Lattice::new(&volume, DVec3::new(0.1, 0.2, 0.0), DVec3::Z);
         // Texel centres at w = 1/8, 3/8, 5/8, 7/8; below the first and above the last, w clamps.
         assert_eq!(lattice.cubic(0.0, 0.125), None);
         assert_eq!(lattice.cubic(0.125, 0.375), None);

@@ -11,7 +11,7 @@ use super::{
 };
 
 /// Vulkan's linear filter, straight from its definition.
-fn filtered(volume: &Volume, texture: DVec3) -> [f64; 4] {
+pub fn filtered(volume: &Volume, texture: DVec3) -> [f64; 4] {
     let size = volume.size.map(i64::from);
     let mut sum = [0.0; 4];
     let place: [f64; 3] = std::array::from_fn(|i| texture[i] * size[i] as f64 - 0.5);

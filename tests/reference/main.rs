@@ -4,12 +4,15 @@
 mod brute_force;
 mod closed_forms;
 mod consistency;
+mod emission;
+mod shadows;
+mod solids;
 
 use glam::{DVec2, DVec3};
 use mesoshell::mesh::generate::{Generator, Plane, Torus};
-use mesoshell::scene::{Camera, March, Medium, Scene, View};
+use mesoshell::scene::{Camera, Emission, Light, March, Medium, Model, Scene, Shading, Source, View};
 use mesoshell::shell::{Shell, ShellOptions};
-use mesoshell::volume::{Pyramid, Volume};
+use mesoshell::volume::{Directions, Pyramid, Volume};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg32;
 
@@ -71,7 +74,35 @@ fn slanted_view() -> View {
 
 fn scene(shell: Shell, volume: Pyramid, view: View) -> Scene {
     let medium = Medium { opacity_distance: OPACITY_DISTANCE, lod_footprint: 0.0 };
-    Scene { shell, volume, medium, shading: None, view, march: March::Default { step: 1.0 } }
+    Scene {
+        shell,
+        volume,
+        medium,
+        shading: None,
+        solids: Vec::new(),
+        view,
+        march: March::Default { step: 1.0 },
+    }
+}
+
+/// Casts shadows.
+fn light(source: Source, colour: DVec3) -> Light {
+    Light { source, colour, shadow: true }
+}
+
+/// Particles of every direction, which send on a quarter of what they receive: white where the texture is.
+fn lit(scene: &Scene, lights: Vec<Light>) -> Shading {
+    Shading {
+        model: Model::Surface,
+        ambient: DVec3::ZERO,
+        diffuse: 1.0,
+        specular: 0.0,
+        shininess: 1.0,
+        emission: Emission { glow: 0.0, from: 0.0 },
+        shadow_size: 64,
+        lights,
+        directions: Directions::of(&scene.volume.levels[0], |_| DVec3::ZERO),
+    }
 }
 
 fn centre(x: u32, y: u32) -> DVec2 {
