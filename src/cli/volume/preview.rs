@@ -153,8 +153,9 @@ fn slab(volume: Volume, height: f64, pixels: [u32; 2]) -> Result<Scene> {
     let shell = Shell::build(&mesh, &options)?;
     let mut scene = Scene::new(shell, Pyramid::build(volume), opacity_distance);
     [scene.view.width, scene.view.height] = pixels;
-    // The slab fills less than the sphere around it, and it is as wide whatever the picture's height.
-    scene.view.camera.fov_y *= 0.95 * f64::from(pixels[1]) / f64::from(pixels[0]);
+    // The slab fills less than the sphere around it; the lower the picture, the more it is as wide as that.
+    let aspect = f64::from(pixels[1]) / f64::from(pixels[0]);
+    scene.view.camera.fov_y *= if aspect < 1.0 { 1.04 * aspect } else { 0.95 };
     Ok(scene)
 }
 

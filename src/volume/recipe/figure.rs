@@ -212,7 +212,8 @@ impl Figures {
                     let place = surroundings.place(point);
                     // How fast the field grows from texel to texel says how many texels off the surface is.
                     let steepness = (placed.turn.transpose() * place.outward * spacing).length();
-                    let cover = smoothstep(1., -1., (place.field / steepness.max(1e-9)) as f32);
+                    // Where parts meet, that is up to a quarter too steep.
+                    let cover = smoothstep(1., -1., 0.75 * (place.field / steepness.max(1e-9)) as f32);
                     if cover > 0. {
                         let light = 1. - self.keys.occlusion * (1. - place.sky as f32);
                         let colour = Vec3::ONE.lerp(place.colour, self.keys.paint) * self.keys.tint.0 * light;
