@@ -6,7 +6,7 @@ use std::fmt;
 use bytemuck::NoUninit;
 use serde::{Deserialize, Serialize};
 
-use crate::reference::TOLERANCE;
+use crate::reference::tolerance;
 use crate::scene::{Light, Model, Scene, Shading, Solid, Source, View};
 use crate::volume::{DirectionLevel, Quantity, Volume};
 
@@ -27,8 +27,13 @@ const REFERENCE_CODE: [(&str, &str); 13] = [
     ("umbra.rs", include_str!("../reference/umbra.rs")),
 ];
 
-/// What of a scene the reference asks for: rays, and the density of texels across them.
-const SCENE_CODE: [&str; 2] = [include_str!("../scene/camera.rs"), include_str!("../scene/mod.rs")];
+/// What of a scene the reference asks for: rays of the eye and of lights, and the density of texels across them and on solids.
+const SCENE_CODE: [&str; 4] = [
+    include_str!("../scene/camera.rs"),
+    include_str!("../scene/mod.rs"),
+    include_str!("../scene/shadow.rs"),
+    include_str!("../scene/solid.rs"),
+];
 
 /// Written as 32 hexadecimal digits.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -73,7 +78,7 @@ impl Fingerprint {
     /// Of everything that the reference's picture of `view` depends on: geometry, texture, medium, light, camera, and the
     /// reference itself. How finely a method marches is not among it.
     pub fn of_reference(scene: &Scene, view: &View) -> Self {
-        let builder = Self::builder("reference").numbers(&[TOLERANCE, scene.medium.lod_footprint]);
+        let builder = Self::builder("reference").numbers(&[tolerance(scene), scene.medium.lod_footprint]);
         seen(builder, scene, view, &scene.volume.levels)
     }
 
@@ -176,6 +181,7 @@ pub(crate) mod tests {
     use glam::DVec3;
 
     use super::*;
+    use crate::mesh::Mesh;
     use crate::mesh::generate::{Generator, Torus};
     use crate::scene::{Emission, March};
     use crate::shell::{Shell, ShellOptions};
@@ -263,6 +269,10 @@ pub(crate) mod tests {
             shading.lights[1].source = Source::Point { position: DVec3::X, falloff: Some(1.0) };
         }),
         ("a light's colour", |shading| shading.lights[1].colour.z = 0.5),
+        ("a light's shadow", |shading| shading.lights[1].shadow = true),
+        ("the size of shadows", |shading| shading.shadow_size += 1),
+        ("the glow", |shading| shading.emission.glow = 0.5),
+        ("where the glow begins", |shading| shading.emission.from = 0.5),
         ("a light less", |shading| shading.lights.truncate(1)),
         ("a normal", |shading| shading.directions.levels[0].texels[3][1] += 1e-6),
         ("a coarser normal", |shading| shading.directions.levels[1].texels[0][2] += 1e-6),
@@ -277,6 +287,41 @@ pub(crate) mod tests {
         for (name, change) in LIGHTS {
             let mut changed = lit();
             change(changed.shading.as_mut().unwrap());
+            assert_ne!(original, print(&changed), "{name}");
+        }
+    }
+
+    /// The same beside a triangle with a texture.
+    fn solid() -> Scene {
+        let texture = Volume::new([2, 1, 1], vec![[0.5, 0.25, 0.0, 1.0]; 2]).unwrap();
+        let solid =
+            Solid { mesh: Mesh::triangle(), colour: DVec3::ONE, texture: Some(Pyramid::build(texture)) };
+        Scene { solids: vec![solid], ..scene() }
+    }
+
+    /// A change of the solid, and its name for the failure's sake.
+    type Reshape = (&'static str, fn(&mut Solid));
+
+    const SOLIDS: &[Reshape] = &[
+        ("a position", |solid| solid.mesh.positions[1].x += 1e-9),
+        ("a normal", |solid| solid.mesh.normals[2].x += 1e-9),
+        ("the order of corners", |solid| solid.mesh.triangles[0] = [1, 2, 0]),
+        ("texture coordinates", |solid| solid.mesh.uvs[0][1].y += 1e-9),
+        ("the colour", |solid| solid.colour.y = 0.5),
+        ("a texel", |solid| solid.texture.as_mut().unwrap().levels[0].texels[1][0] += 1e-6),
+        ("a coarser texel", |solid| solid.texture.as_mut().unwrap().levels[1].texels[0][0] += 1e-6),
+        ("no texture", |solid| solid.texture = None),
+    ];
+
+    #[test]
+    fn every_change_of_a_solid_is_seen() {
+        let print = |scene: &Scene| Fingerprint::of_reference(scene, &scene.view);
+        let original = print(&solid());
+        assert_ne!(original, print(&scene()), "none");
+        assert_eq!(original, print(&solid()));
+        for (name, change) in SOLIDS {
+            let mut changed = solid();
+            change(&mut changed.solids[0]);
             assert_ne!(original, print(&changed), "{name}");
         }
     }

@@ -221,7 +221,7 @@ impl<'a> RayIntegral<'a> {
         let walls: Vec<_> = layers.iter().filter(|layer| layer.medium.is_wall()).collect();
         let part = self.transmittance / walls.len() as f64;
         for layer in walls {
-            let texel = layer.radiant(self.lit, 0.0, depth, |light| shadows.traced(light, depth));
+            let texel = layer.radiant(self.lit, 0.0, depth, |light, _| shadows.traced(light, depth));
             for (sum, premultiplied) in colour.iter_mut().zip(texel) {
                 *sum += part * premultiplied;
             }
@@ -283,7 +283,8 @@ impl<'a> RayIntegral<'a> {
             let z = piece.start + x * piece.length;
             for layer in &self.layers {
                 let shadows = &mut self.shadows;
-                let reaching = |light| shadows.interpolated(light, z, self.transmittance);
+                let reaching =
+                    |light, brightness| shadows.interpolated(light, z, self.transmittance * brightness);
                 let texel = layer.radiant(self.lit, x, z, reaching);
                 let per_alpha = match quantity {
                     Quantity::Opacity => extinction_per_alpha(texel[ALPHA], texel[CLEAR]),
@@ -334,7 +335,13 @@ impl LitLayer<'_> {
     }
 
     /// The texture at `x` (0..1) of the piece, at depth `z`, its colour as it is lit.
-    fn radiant(&self, lit: Option<&Lit<'_>>, x: f64, z: f64, reaching: impl FnMut(usize) -> f64) -> Texel {
+    fn radiant(
+        &self,
+        lit: Option<&Lit<'_>>,
+        x: f64,
+        z: f64,
+        reaching: impl FnMut(usize, f64) -> f64,
+    ) -> Texel {
         let texel = self.medium.at(x, z);
         match (lit, &self.surroundings) {
             (Some(lit), Some(surroundings)) if texel[ALPHA] > 0.0 => {

@@ -59,14 +59,14 @@ impl<'a> Lit<'a> {
     }
 
     /// The texel as it is lit: its alpha, and the premultiplied colour that it sends to the eye, where `reaching` says which part
-    /// of a light that casts shadows reaches it.
+    /// of a light that casts shadows reaches it; it is told by how much the colour would be brighter for all of it.
     pub fn shade(
         &self,
         texel: &Texel,
         vector: &Texel,
         surroundings: &Surroundings<'_>,
         depth: f64,
-        mut reaching: impl FnMut(usize) -> f64,
+        mut reaching: impl FnMut(usize, f64) -> f64,
     ) -> Texel {
         let Shading { model, ambient, diffuse, specular, shininess, emission, lights, .. } = self.shading;
         let point = surroundings.eye + depth * surroundings.direction;
@@ -76,6 +76,8 @@ impl<'a> Lit<'a> {
         let frame = surroundings.frame_at_eye + depth * surroundings.frame_per_depth;
         let direction = (frame * in_texture).normalize_or_zero();
         let agreement = if direction == DVec3::ZERO { 0.0 } else { (in_texture.length() / weight).min(1.0) };
+        let alpha = texel[ALPHA];
+        let colour = DVec3::new(texel[0], texel[1], texel[2]) / alpha;
         let (mut scattered, mut mirrored) = (*ambient, DVec3::ZERO);
         for (number, light) in lights.iter().enumerate() {
             let (mut arriving, to_light) = arriving(light, point);
@@ -95,14 +97,16 @@ impl<'a> Lit<'a> {
             };
             let scatter = diffuse * (agreement * aligned + (1.0 - agreement) * mean);
             let mirror = specular * agreement * lobe;
-            if light.shadow && scatter + mirror > 0.0 {
-                arriving *= reaching(number);
+            if light.shadow {
+                let brightness = (arriving * (colour * scatter + mirror)).max_element();
+                if brightness > 0.0 {
+                    arriving *= reaching(number, brightness);
+                }
             }
             scattered += arriving * scatter;
             mirrored += arriving * mirror;
         }
-        let alpha = texel[ALPHA];
-        let brightest = texel[0].max(texel[1]).max(texel[2]) / alpha;
+        let brightest = colour.max_element();
         scattered += emission.glow * ((brightest - emission.from) / (1.0 - emission.from)).clamp(0.0, 1.0);
         let mut lit = *texel;
         for channel in 0..3 {

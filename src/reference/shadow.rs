@@ -68,6 +68,8 @@ pub struct Shadows {
     beacons: Vec<Beacon>,
     /// How much of an error of what reaches a point from all these lights may be seen, at most.
     weight: f64,
+    /// How many lights cast shadows.
+    count: usize,
     /// In world units: no straight line in the scene is longer.
     extent: f64,
     /// In world units: what is interpolated in one go.
@@ -98,12 +100,14 @@ impl Shadows {
         let beacons = shading.lights.iter().map(beacon).collect();
         let light: DVec3 = shading.lights.iter().filter(|light| light.shadow).map(|light| light.colour).sum();
         let weight = light.max_element() * (shading.diffuse * unlit + shading.specular);
-        pixels.iter().any(Option::is_some).then(|| {
+        let count = pixels.iter().flatten().count();
+        (count > 0).then(|| {
             let [u, v, w] = texel_edges(&scene.shell, scene.volume.levels[0].size);
             Self {
                 pixels,
                 beacons,
                 weight,
+                count,
                 extent: 2.0 * radius,
                 stretch: TEXELS_OF_STRETCH * u.min(v).min(w),
             }
@@ -213,9 +217,9 @@ impl<'a> ShadowsOnRay<'a> {
         self.paths
     }
 
-    /// The part of light number `light` that reaches the point at this depth, to what the tolerance allows behind the
-    /// transmittance `before`.
-    pub fn interpolated(&mut self, light: usize, depth: f64, before: f64) -> f64 {
+    /// The part of light number `light` that reaches the point at this depth, to what the tolerance allows where `weight` of an
+    /// error of it is seen.
+    pub fn interpolated(&mut self, light: usize, depth: f64, weight: f64) -> f64 {
         let Self { reference, direction, penumbrae, umbrae, paths, .. } = self;
         let Some(shadows) = &reference.shadows else { return 1.0 };
         let is_hidden = umbrae[light]
@@ -224,7 +228,7 @@ impl<'a> ShadowsOnRay<'a> {
         if is_hidden {
             return 0.0;
         }
-        let allowed = OF_PENUMBRAE * reference.tolerance / (shadows.weight * before);
+        let allowed = OF_PENUMBRAE * reference.tolerance / (shadows.count as f64 * weight);
         penumbrae[light].at(depth, allowed, |depth| {
             *paths += 1;
             shadows.transmittance(reference, light, depth * *direction)
