@@ -122,14 +122,13 @@ fn a_light_reads_the_level_of_detail_of_its_own_pixels() {
     let view = view(DVec3::new(0.3, 2.0, 0.9), DVec3::new(0.05, 0.0, 0.02), 3);
     let eye = view.camera.eye;
     // One picture, one, and six.
-    let sources = [
-        Source::Directional { towards: SUN },
-        Source::Point { position: DVec3::new(1.5, 9.0, -3.0), falloff: None },
-        Source::Point { position: DVec3::new(0.7, 0.4, -0.3), falloff: None },
+    let lamp = |x, y, z| Source::Point { position: DVec3::new(x, y, z), falloff: None };
+    let cases = [
+        (Source::Directional { towards: SUN }, 1, 2.0),
+        (lamp(1.5, 9.0, -3.0), 1, 4.0),
+        (lamp(0.7, 0.4, -0.3), 6, 2.5),
     ];
-    for (source, views, footprint) in
-        sources.into_iter().zip([1, 1, 6]).zip([2.0, 4.0, 2.5]).map(|((a, b), c)| (a, b, c))
-    {
+    for (source, views, footprint) in cases {
         let mut scene = scene(flat_shell(), pyramid.clone(), view);
         scene.medium.lod_footprint = footprint;
         let lamp = light(source, DVec3::ONE);
@@ -261,6 +260,27 @@ fn the_shadow_of_a_plate_lies_in_the_fog_and_on_the_floor() {
     for case in [(true, true), (true, false), (false, false)] {
         assert!(ranges.iter().filter(|range| **range == case).count() > 20, "{case:?}");
     }
+}
+
+/// The ray and the light span no plane then.
+#[test]
+fn a_ray_that_comes_from_the_light_is_lit_unless_a_solid_is_behind_the_eye() {
+    let target = DVec3::new(0.1, 0.0, 0.6);
+    let view = view(target + 1.3 * SUN, target, 3);
+    let mut scene = fog(sun(), view, Quantity::Opacity);
+    let middle = |scene: &Scene| Reference::new(scene, &view).pixel(1, 1).rgba;
+    let bright = 0.125 * -(-2.0 * SIGMA * THICKNESS / SUN.y).exp_m1();
+    let passed = (-SIGMA * THICKNESS / SUN.y).exp();
+    let expected = [bright, 2.0 * bright, 4.0 * bright, 1.0 - passed];
+    assert!(error(&middle(&scene), &expected) <= SHADOW_TOLERANCE);
+    // Along the sun from the target, the plate's height is over its middle.
+    let towards = target + SUN * (PLATE / SUN.y);
+    scene.solids = plate_and_floor(towards.x - 0.4);
+    assert_eq!(middle(&scene), [0.0, 0.0, 0.0, 1.0]);
+    scene.solids.remove(0);
+    let floor = 0.5 * SUN.y * passed * passed;
+    let [r, g, b] = [1.0, 2.0, 4.0].map(|light| light * (bright + floor));
+    assert!(error(&middle(&scene), &[r, g, b, 1.0]) <= SHADOW_TOLERANCE);
 }
 
 /// What the eye sees of a wall is its surface, and that is not in its own shadow, however it is turned.
