@@ -157,7 +157,8 @@ fn methods() -> PossibleValuesParser {
     METHODS.iter().map(|entry| PossibleValue::new(entry.name).help(entry.summary)).collect::<Vec<_>>().into()
 }
 
-fn size(text: &str) -> std::result::Result<PictureSize, String> {
+/// Reads a `WxH`.
+pub fn size(text: &str) -> std::result::Result<PictureSize, String> {
     let (width, height) = text.split_once(['x', 'X']).ok_or("write it as 640x480")?;
     let pixels = |side: &str| side.parse::<u32>().map_err(|_| format!("`{side}` is no number of pixels"));
     PictureSize::new(pixels(width)?, pixels(height)?)

@@ -46,6 +46,25 @@ impl Backdrop {
     pub fn gain(&self) -> f32 {
         self.exposure.exp2() as f32
     }
+
+    /// What becomes of the pixels, by index and value, of an image of that size: over what is behind it, and exposed. They
+    /// are linear and premultiplied still, and opaque where there is something behind.
+    pub(crate) fn develop(&self, width: u32, height: u32) -> impl Fn(usize, [f32; 4]) -> [f32; 4] + use<> {
+        let picture = match &self.behind {
+            Behind::Picture(picture) => Some(cover(picture, width, height)),
+            _ => None,
+        };
+        let (is_opaque, colour, gain) = (self.behind != Behind::Nothing, self.flat_colour(), self.gain());
+        move |index, [r, g, b, a]| {
+            let behind = picture.as_ref().map_or(colour, |picture| {
+                let [r, g, b, _] = picture.rgba[index];
+                [r, g, b]
+            });
+            let under = behind.map(|x| x * (1.0 - a.clamp(0.0, 1.0)));
+            let [r, g, b] = [r + under[0], g + under[1], b + under[2]].map(|x| gain * x);
+            [r, g, b, if is_opaque { 1.0 } else { a }]
+        }
+    }
 }
 
 /// What source pixels a row or column is mixed of: the first, and the weights from there on, which sum to 1.
@@ -58,7 +77,7 @@ struct Mix {
 ///
 /// The filter is a tent as wide as two pixels of the finer of both, so that nothing is left out when it shrinks, and it is
 /// interpolated when it grows. It never rings, which on the bright sun of a sky would show.
-pub(super) fn cover(picture: &Image, width: u32, height: u32) -> Image {
+pub(crate) fn cover(picture: &Image, width: u32, height: u32) -> Image {
     // Source pixels a pixel.
     let scale =
         (f64::from(picture.width) / f64::from(width)).min(f64::from(picture.height) / f64::from(height));

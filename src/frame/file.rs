@@ -16,7 +16,6 @@ use image::{DynamicImage, ExtendedColorType, ImageDecoder, ImageEncoder, ImageEr
 
 pub use picture::{is_picture, read_picture};
 
-use super::backdrop::cover;
 use super::srgb::{linear_from_srgb, srgb_from_linear};
 use super::{Backdrop, Behind, Image};
 use crate::{Error, Result, input, output};
@@ -135,7 +134,8 @@ fn decode_srgb(path: &Path, decoder: impl ImageDecoder, length: u64, pixels_per_
     Ok(Image { width, height, rgba })
 }
 
-fn check_numbers(path: &Path, image: &Image) -> Result<()> {
+/// Whether a PNG can be made of an image.
+pub(crate) fn check_numbers(path: &Path, image: &Image) -> Result<()> {
     match image.rgba.iter().position(|pixel| pixel.iter().any(|x| x.is_nan())) {
         None => Ok(()),
         Some(index) => {
@@ -150,32 +150,23 @@ fn check_numbers(path: &Path, image: &Image) -> Result<()> {
 pub(crate) fn write_png(writer: impl Write, image: &Image, backdrop: &Backdrop) -> Result<(), ImageError> {
     let (width, height) = (image.width, image.height);
     let encoder = PngEncoder::new(writer);
-    let gain = backdrop.gain();
     let byte = |x: f32| (255.0 * x.clamp(0.0, 1.0)).round() as u8;
-    let srgb_byte = |linear: f32| byte(srgb_from_linear((gain * linear).clamp(0.0, 1.0)));
-    let over = |[r, g, b, a]: [f32; 4], behind: [f32; 3]| {
-        let under = behind.map(|x| x * (1.0 - a.clamp(0.0, 1.0)));
-        [r + under[0], g + under[1], b + under[2]].map(srgb_byte)
-    };
-    let opaque: Vec<u8> = match &backdrop.behind {
-        Behind::Nothing => {
-            let straight = |&[r, g, b, a]: &[f32; 4]| {
-                // Where nothing that is left covers the pixel, colour has no meaning.
-                let alpha = byte(a);
-                let [r, g, b] = [r, g, b].map(|x| if alpha > 0 { srgb_byte(x / a) } else { 0 });
-                [r, g, b, alpha]
-            };
-            let bytes: Vec<u8> = image.rgba.iter().flat_map(straight).collect();
-            return encoder.write_image(&bytes, width, height, ExtendedColorType::Rgba8);
-        }
-        Behind::Colour(colour) => image.rgba.iter().flat_map(|&pixel| over(pixel, *colour)).collect(),
-        Behind::Picture(picture) => {
-            let picture = cover(picture, width, height);
-            let pairs = image.rgba.iter().zip(&picture.rgba);
-            pairs.flat_map(|(&pixel, &[r, g, b, _])| over(pixel, [r, g, b])).collect()
-        }
-    };
-    encoder.write_image(&opaque, width, height, ExtendedColorType::Rgb8)
+    let srgb_byte = |linear: f32| byte(srgb_from_linear(linear.clamp(0.0, 1.0)));
+    let develop = backdrop.develop(width, height);
+    let developed = image.rgba.iter().enumerate().map(|(index, &pixel)| develop(index, pixel));
+    if backdrop.behind == Behind::Nothing {
+        let straight = |[r, g, b, a]: [f32; 4]| {
+            // Where nothing that is left covers the pixel, colour has no meaning.
+            let alpha = byte(a);
+            let [r, g, b] = [r, g, b].map(|x| if alpha > 0 { srgb_byte(x / a) } else { 0 });
+            [r, g, b, alpha]
+        };
+        let bytes: Vec<u8> = developed.flat_map(straight).collect();
+        encoder.write_image(&bytes, width, height, ExtendedColorType::Rgba8)
+    } else {
+        let bytes: Vec<u8> = developed.flat_map(|[r, g, b, _]| [r, g, b].map(srgb_byte)).collect();
+        encoder.write_image(&bytes, width, height, ExtendedColorType::Rgb8)
+    }
 }
 
 fn premultiplied_from_srgb([r, g, b, a]: [f32; 4]) -> [f32; 4] {

@@ -3,6 +3,7 @@
 pub mod backdrop;
 pub mod file;
 pub mod image;
+pub(crate) mod lettering;
 pub mod report;
 pub mod srgb;
 
