@@ -1,11 +1,10 @@
-# make demo renders the first picture, make test runs every test, make bench measures time against error,
-# make recipe-pictures draws those of docs/volumes.md; all first
-# install what the machine lacks.
+# make demo renders the first picture, make test runs every test, make bench measures time against error, make gallery
+# renders all scenes, make recipe-pictures draws those of docs/volumes.md; all first install what the machine lacks.
 
 CARGO ?= cargo
 TARGET := $(or $(CARGO_TARGET_DIR),target)
 
-.PHONY: demo test bench recipe-pictures setup setup-test
+.PHONY: demo test bench gallery recipe-pictures setup setup-test
 
 demo: setup
 	$(CARGO) build --release
@@ -17,6 +16,12 @@ bench: setup
 	$(CARGO) build --release
 	$(TARGET)/release/mesoshell bench benches/default.toml --output out/bench
 	@echo "the report is in out/bench/report.html"
+
+# The scenes of the 2005 paper first; none comes twice.
+gallery: setup
+	$(CARGO) build --release
+	$(TARGET)/release/mesoshell gallery scenes/table1 scenes/figure1 scenes/figure5 scenes/effects scenes -o out/gallery
+	@echo "the page is out/gallery/index.html"
 
 test: setup-test
 	$(CARGO) test --release

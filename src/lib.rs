@@ -13,7 +13,7 @@
 //! let frame = method::render(loaded.scene)?;
 //! let covered = frame.image.rgba.iter().filter(|[.., alpha]| *alpha > 0.5).count();
 //! assert!(covered > 2000, "the ball fills more than half of the 4096 pixels");
-//! frame::file::write(folder.path().join("fur.png"), &frame.image, loaded.background)?;
+//! frame::file::write(folder.path().join("fur.png"), &frame.image, &loaded.backdrop)?;
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!

@@ -146,6 +146,38 @@ fn overrides_and_backgrounds_show() {
 }
 
 #[test]
+fn a_picture_lies_behind_and_all_is_exposed() {
+    let desk = Desk::new();
+    let sky = image::RgbImage::from_fn(64, 32, |x, _| {
+        // The outer quarters are cut off; a tent of two pixels sees a little of them.
+        image::Rgb(if (16..48).contains(&x) { [0, 64, 128] } else { [255, 0, 0] })
+    });
+    sky.save(desk.path().join("sky.png")).unwrap();
+    let background = "image.background=sky.png";
+    let render = |name: &str, overrides: &[&str]| {
+        let output = desk.run(&[RENDER, &["-q", "-o", name, "-D", background], overrides].concat());
+        assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+        desk.path().join(name)
+    };
+    let plain = image::open(render("plain.png", &[])).unwrap().into_rgba8();
+    for x in 1..5 {
+        assert_eq!(plain.get_pixel(x, 0).0, [0, 64, 128, 255], "column {x}");
+    }
+    assert_ne!(plain.get_pixel(8, 8), plain.get_pixel(1, 0), "the scene is in front");
+    let bright = image::open(render("bright.png", &["-D", "image.exposure=1"])).unwrap().into_rgba8();
+    assert_eq!(bright.get_pixel(1, 0).0, [0, 90, 176, 255]);
+    let exr = |name: &str, overrides: &[&str]| fs::read(render(name, overrides)).unwrap();
+    assert!(exr("a.exr", &["-D", "image.exposure=1"]) == exr("b.exr", &["-D", "image.background=#000000"]));
+    desk.refuses(
+        &[RENDER, &["-D", "image.background=nowhere.jpg"]].concat(),
+        3,
+        &["nowhere.jpg", "background"],
+    );
+    desk.write("torn.jpg", "not a picture");
+    desk.refuses(&[RENDER, &["-D", "image.background=torn.jpg"]].concat(), 3, &["torn.jpg", "decoded"]);
+}
+
+#[test]
 fn diff_tells_images_apart() {
     let desk = Desk::new();
     for (name, thickness) in [("a.exr", "shell.thickness=0.2"), ("b.exr", "shell.thickness=0.4")] {

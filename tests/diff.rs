@@ -4,7 +4,7 @@ use std::fs;
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
 
-use mesoshell::frame::{Image, file};
+use mesoshell::frame::{Backdrop, Image, file};
 use serde_json::Value;
 use tempfile::TempDir;
 
@@ -23,7 +23,7 @@ impl Desk {
 
     fn row(&self, name: &str, rgba: Vec<[f32; 4]>) {
         let image = Image { width: rgba.len() as u32, height: 1, rgba };
-        file::write(self.path().join(name), &image, None).unwrap();
+        file::write(self.path().join(name), &image, &Backdrop::default()).unwrap();
     }
 
     fn path(&self) -> &Path {

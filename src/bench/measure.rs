@@ -10,7 +10,7 @@ use super::fingerprint::Fingerprint;
 use super::remaining::Remaining;
 use super::results::{Point, SceneResults};
 use super::sweep::Setting;
-use crate::frame::{Frame, Image};
+use crate::frame::{Backdrop, Frame, Image};
 use crate::method::{self, Method, Setup};
 use crate::progress::{Progress, Silent};
 use crate::scene::Scene;
@@ -22,8 +22,8 @@ pub struct Subject<'a> {
     pub path: &'a Path,
     /// The scene.
     pub scene: &'a Scene,
-    /// Of its picture, linear RGB.
-    pub background: Option<[f32; 3]>,
+    /// On which its picture is laid.
+    pub backdrop: &'a Backdrop,
     /// The points.
     pub settings: &'a [Setting],
     /// Timed frames of each point.
@@ -39,8 +39,8 @@ pub struct Pictures {
     pub reference: Image,
     /// By the points of least and of largest error: see [`SceneResults::best_and_worst`].
     pub best_and_worst: [Image; 2],
-    /// On which they are laid, linear RGB.
-    pub background: Option<[f32; 3]>,
+    /// On which they are laid.
+    pub backdrop: Backdrop,
 }
 
 /// A prepared point.
@@ -136,8 +136,8 @@ pub fn measure(
         let position = wanted.iter().position(|&wanted| wanted == index).expect("warmed up above");
         contenders[position].warm_up.image.clone()
     });
-    let background = subject.background;
-    Ok((results, Pictures { reference: reference.image, best_and_worst: pictures, background }))
+    let backdrop = subject.backdrop.clone();
+    Ok((results, Pictures { reference: reference.image, best_and_worst: pictures, backdrop }))
 }
 
 impl Contender {
@@ -155,7 +155,7 @@ impl Contender {
 
 /// Points without a run. The picture is the same in every run, so that of the warm-up stands for all.
 fn points(subject: &Subject<'_>, contenders: &[Contender], reference: &Image) -> Result<Vec<Point>> {
-    let background = subject.background.unwrap_or_default();
+    let background = subject.backdrop.flat_colour();
     let point = |(setting, contender): (&Setting, &Contender)| {
         let metrics = metric::compare_over(&contender.warm_up.image, reference, background)?.metrics;
         Ok(Point::new(setting.clone(), &metrics))

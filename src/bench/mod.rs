@@ -3,7 +3,7 @@
 //! A [`Sweep`] says which scenes are measured at which [`Setting`]s; [`run()`] measures it, and writes what it found as
 //! JSON, CSV and a report in HTML. Times are taken in rounds over all points of a scene ([`mod@measure`]), errors against
 //! the f64 reference, whose pictures are kept in a [`cache`]. `docs/bench.md` describes the files key by key. The [`pilot`]
-//! chooses a march by the error that is accepted; [`antialiasing`] compares filters.
+//! chooses a march by the error that is accepted; [`antialiasing`] compares filters; a [`gallery`] shows many scenes.
 
 pub mod antialiasing;
 pub mod cache;
@@ -11,6 +11,7 @@ pub mod convergence;
 pub mod environment;
 mod file;
 pub mod fingerprint;
+pub mod gallery;
 pub mod measure;
 pub mod pareto;
 pub mod pilot;

@@ -80,7 +80,7 @@ pub fn run(sweep: &Sweep, options: &Options<'_>, setup: &Setup<'_>) -> Result<Ou
         let subject = Subject {
             path,
             scene: &loaded.scene,
-            background: loaded.background,
+            backdrop: &loaded.backdrop,
             settings: &sweep.settings,
             runs: sweep.runs as usize,
             cache: options.cache,

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::{Args, ValueEnum};
-use mesoshell::frame::{Image, file};
+use mesoshell::frame::{Backdrop, Image, file};
 use mesoshell::metric::{self, Comparison, Metrics, map};
 use mesoshell::{Error, Result};
 use serde::Serialize;
@@ -99,14 +99,15 @@ pub fn run(arguments: Arguments, talk: Talk) -> Result<ExitCode> {
         check_numbers(&a_path, &a)?;
         check_numbers(&b_path, &b)?;
     }
+    let black = Backdrop::colour([0.0; 3]);
     let mut map_range = None;
     if let Some(path) = map {
         let differences = map::luminance_differences(&a, &b, background)?;
         let range = *map_range.insert(range.unwrap_or_else(|| map::natural_range(&differences)));
-        file::write(path, &map::signed(&differences, a.width, range), Some([0.0; 3]))?;
+        file::write(path, &map::signed(&differences, a.width, range), &black)?;
     }
     if let Some(path) = flip_map {
-        file::write(path, &map::flip(&flip_errors, a.width), Some([0.0; 3]))?;
+        file::write(path, &map::flip(&flip_errors, a.width), &black)?;
     }
 
     let difference = Difference { metrics, map_range };

@@ -6,6 +6,7 @@ mod accuracy;
 mod bench;
 mod devices;
 mod diff;
+mod gallery;
 mod mesh;
 mod output;
 mod progress;
@@ -22,7 +23,8 @@ const EXIT_CODES: &str = "\
 Exit codes:
   0    done
   1    diff: the images differ by more than --threshold; stress: a case fails;
-       render --verify: the error is above --max-error
+       render --verify: the error is above --max-error;
+       gallery: a scene's error is above its bound
   2    the request makes no sense (an unknown option, a bad -D)
   3    an input file is missing, damaged or means something impossible
   4    no usable Vulkan device
@@ -63,6 +65,7 @@ enum Command {
     Volume(volume::Command),
     Diff(diff::Arguments),
     Bench(bench::Arguments),
+    Gallery(gallery::Arguments),
     Stress(stress::Arguments),
 }
 
@@ -83,6 +86,7 @@ pub fn run() -> ExitCode {
         Command::Volume(command) => volume::run(command, talk).map(|()| ExitCode::SUCCESS),
         Command::Diff(arguments) => diff::run(arguments, talk),
         Command::Bench(arguments) => bench::run(arguments, talk).map(|()| ExitCode::SUCCESS),
+        Command::Gallery(arguments) => gallery::run(arguments, talk),
         Command::Stress(arguments) => stress::run(arguments, talk),
     };
     done.unwrap_or_else(|error| {

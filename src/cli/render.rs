@@ -108,7 +108,7 @@ fn render(arguments: &Arguments, progress: &Arc<dyn Progress>, interrupt: &Inter
 
     let size = arguments.size.map(|PictureSize(size)| size.map(|side| side.0));
     let admit = |sizes: &Sizes| method.admit(&Sizes { picture: size.unwrap_or(sizes.picture), ..*sizes });
-    let Loaded { scene: mut loaded, background, stages: load } =
+    let Loaded { scene: mut loaded, backdrop, stages: load } =
         scene::load_if(scene, &arguments.define, progress.as_ref(), &admit)?;
     stages.extend(load);
     [loaded.view.width, loaded.view.height] = size.unwrap_or([loaded.view.width, loaded.view.height]);
@@ -144,7 +144,7 @@ fn render(arguments: &Arguments, progress: &Arc<dyn Progress>, interrupt: &Inter
         watch.lap("verify");
     }
     progress.stage("writing the picture");
-    file::write(&output, &frame.image, background)?;
+    file::write(&output, &frame.image, &backdrop)?;
     watch.lap("write");
     stages.append(&mut frame.report.stages);
     stages.extend(watch.finish());
@@ -157,7 +157,8 @@ fn methods() -> PossibleValuesParser {
     METHODS.iter().map(|entry| PossibleValue::new(entry.name).help(entry.summary)).collect::<Vec<_>>().into()
 }
 
-fn size(text: &str) -> std::result::Result<PictureSize, String> {
+/// Reads a `WxH`.
+pub fn size(text: &str) -> std::result::Result<PictureSize, String> {
     let (width, height) = text.split_once(['x', 'X']).ok_or("write it as 640x480")?;
     let pixels = |side: &str| side.parse::<u32>().map_err(|_| format!("`{side}` is no number of pixels"));
     PictureSize::new(pixels(width)?, pixels(height)?)

@@ -1,10 +1,12 @@
-//! Image files: PNG (8-bit sRGB, for people) and OpenEXR (linear premultiplied f32, for measuring).
+//! Image files: PNG (8-bit sRGB, for people) and OpenEXR (linear premultiplied f32, for measuring). Backgrounds may be JPEG.
 //!
 //! Files are written beside their final name and then renamed, so that there is never half a file
 //! under that name. Sizes that a file claims are checked against its length before memory is asked for.
 
 mod exr_header;
+mod picture;
 
+use std::fs::File;
 use std::io::{BufReader, BufWriter, Write};
 use std::path::Path;
 
@@ -12,8 +14,10 @@ use image::codecs::openexr::{OpenExrDecoder, OpenExrEncoder};
 use image::codecs::png::{PngDecoder, PngEncoder};
 use image::{DynamicImage, ExtendedColorType, ImageDecoder, ImageEncoder, ImageError, Limits};
 
-use super::Image;
+pub use picture::{is_picture, read_picture};
+
 use super::srgb::{linear_from_srgb, srgb_from_linear};
+use super::{Backdrop, Behind, Image};
 use crate::{Error, Result, input, output};
 
 /// The most pixels that are read: 4 GiB of f32 RGBA.
@@ -52,14 +56,14 @@ pub fn check_writable(path: impl AsRef<Path>) -> Result<()> {
 
 /// Writes an image as the file's extension says, in place of any file of that name.
 ///
-/// EXR keeps every bit of the linear premultiplied RGBA; `background` is not used. PNG is sRGB with 8 bits a
-/// channel: over `background` (linear RGB) and opaque where one is given, else with straight alpha.
-/// Values outside 0..=1 are clamped there.
+/// EXR keeps every bit of the linear premultiplied RGBA; `backdrop` is not used. PNG is sRGB with 8 bits a
+/// channel: over what is [behind](Backdrop::behind) and opaque where there is something, else with straight alpha.
+/// Values that are outside 0..=1 once exposed are clamped there.
 ///
 /// # Errors
 /// [`Error::Usage`] for an unknown extension, [`Error::Output`] when the file cannot be written, or when
 /// an image with values that are not numbers is to become a PNG.
-pub fn write(path: impl AsRef<Path>, image: &Image, background: Option<[f32; 3]>) -> Result<()> {
+pub fn write(path: impl AsRef<Path>, image: &Image, backdrop: &Backdrop) -> Result<()> {
     let path = path.as_ref();
     let format = Format::of(path)?;
     let mut file = output::file_beside(path)?;
@@ -67,7 +71,7 @@ pub fn write(path: impl AsRef<Path>, image: &Image, background: Option<[f32; 3]>
     let encoded = match format {
         Format::Png => {
             check_numbers(path, image)?;
-            write_png(&mut writer, image, background)
+            write_png(&mut writer, image, backdrop)
         }
         Format::Exr => {
             let (bytes, kind) = (bytemuck::cast_slice(&image.rgba), ExtendedColorType::Rgba32F);
@@ -89,23 +93,14 @@ pub fn write(path: impl AsRef<Path>, image: &Image, background: Option<[f32; 3]>
 pub fn read(path: impl AsRef<Path>) -> Result<Image> {
     let path = path.as_ref();
     let format = Format::of(path)?;
-    let (file, length) =
-        input::open(path).map_err(|error| Error::input(path, format!("cannot be read: {error}")))?;
-    let mut file = BufReader::new(file);
-    let damaged = |error: ImageError| {
-        Error::input(path, format!("cannot be decoded: {error}"))
-            .with_help("is it complete, and what its extension says?")
-    };
+    let (mut file, length) = open(path)?;
+    let damaged = |error: ImageError| damaged(path, &error);
     match format {
         Format::Png => {
             // The default limits bound what is not the image: its profile may not swell beyond 512 MiB.
             let decoder = PngDecoder::with_limits(file, Limits::default()).map_err(damaged)?;
-            let (width, height) = decoder.dimensions();
             // Bilevel images have eight pixels a byte.
-            check_size(path, [width.into(), height.into()], length, 8)?;
-            let decoded = DynamicImage::from_decoder(decoder).map_err(damaged)?.into_rgba32f();
-            let rgba = decoded.pixels().map(|pixel| premultiplied_from_srgb(pixel.0)).collect();
-            Ok(Image { width, height, rgba })
+            decode_srgb(path, decoder, length, 8)
         }
         Format::Exr => {
             for size in exr_header::sizes(path, &mut file)? {
@@ -120,7 +115,27 @@ pub fn read(path: impl AsRef<Path>) -> Result<Image> {
     }
 }
 
-fn check_numbers(path: &Path, image: &Image) -> Result<()> {
+fn open(path: &Path) -> Result<(BufReader<File>, u64)> {
+    let (file, length) =
+        input::open(path).map_err(|error| Error::input(path, format!("cannot be read: {error}")))?;
+    Ok((BufReader::new(file), length))
+}
+
+fn damaged(path: &Path, error: &ImageError) -> Error {
+    Error::input(path, format!("cannot be decoded: {error}"))
+        .with_help("is it complete, and what its extension says?")
+}
+
+fn decode_srgb(path: &Path, decoder: impl ImageDecoder, length: u64, pixels_per_byte: u64) -> Result<Image> {
+    let (width, height) = decoder.dimensions();
+    check_size(path, [width.into(), height.into()], length, pixels_per_byte)?;
+    let decoded = DynamicImage::from_decoder(decoder).map_err(|error| damaged(path, &error))?.into_rgba32f();
+    let rgba = decoded.pixels().map(|pixel| premultiplied_from_srgb(pixel.0)).collect();
+    Ok(Image { width, height, rgba })
+}
+
+/// Whether a PNG can be made of an image.
+pub(crate) fn check_numbers(path: &Path, image: &Image) -> Result<()> {
     match image.rgba.iter().position(|pixel| pixel.iter().any(|x| x.is_nan())) {
         None => Ok(()),
         Some(index) => {
@@ -132,31 +147,25 @@ fn check_numbers(path: &Path, image: &Image) -> Result<()> {
 }
 
 /// The PNG that [`write()`] makes of an image without values that are not numbers.
-pub(crate) fn write_png(
-    writer: impl Write,
-    image: &Image,
-    background: Option<[f32; 3]>,
-) -> Result<(), ImageError> {
+pub(crate) fn write_png(writer: impl Write, image: &Image, backdrop: &Backdrop) -> Result<(), ImageError> {
     let (width, height) = (image.width, image.height);
     let encoder = PngEncoder::new(writer);
     let byte = |x: f32| (255.0 * x.clamp(0.0, 1.0)).round() as u8;
     let srgb_byte = |linear: f32| byte(srgb_from_linear(linear.clamp(0.0, 1.0)));
-    if let Some(background) = background {
-        let opaque = |&[r, g, b, a]: &[f32; 4]| {
-            let under = background.map(|x| x * (1.0 - a.clamp(0.0, 1.0)));
-            [r + under[0], g + under[1], b + under[2]].map(srgb_byte)
-        };
-        let bytes: Vec<u8> = image.rgba.iter().flat_map(opaque).collect();
-        encoder.write_image(&bytes, width, height, ExtendedColorType::Rgb8)
-    } else {
-        let straight = |&[r, g, b, a]: &[f32; 4]| {
+    let develop = backdrop.develop(width, height);
+    let developed = image.rgba.iter().enumerate().map(|(index, &pixel)| develop(index, pixel));
+    if backdrop.behind == Behind::Nothing {
+        let straight = |[r, g, b, a]: [f32; 4]| {
             // Where nothing that is left covers the pixel, colour has no meaning.
             let alpha = byte(a);
             let [r, g, b] = [r, g, b].map(|x| if alpha > 0 { srgb_byte(x / a) } else { 0 });
             [r, g, b, alpha]
         };
-        let bytes: Vec<u8> = image.rgba.iter().flat_map(straight).collect();
+        let bytes: Vec<u8> = developed.flat_map(straight).collect();
         encoder.write_image(&bytes, width, height, ExtendedColorType::Rgba8)
+    } else {
+        let bytes: Vec<u8> = developed.flat_map(|[r, g, b, _]| [r, g, b].map(srgb_byte)).collect();
+        encoder.write_image(&bytes, width, height, ExtendedColorType::Rgb8)
     }
 }
 
@@ -185,6 +194,7 @@ fn check_size(path: &Path, size: [u64; 2], length: u64, pixels_per_byte: u64) ->
 #[cfg(test)]
 mod tests {
     use std::path::PathBuf;
+    use std::sync::Arc;
 
     use rand::RngExt;
     use rand_pcg::Pcg32;
@@ -207,9 +217,9 @@ mod tests {
         image
     }
 
-    fn written(folder: &TempDir, name: &str, image: &Image, background: Option<[f32; 3]>) -> PathBuf {
+    fn written(folder: &TempDir, name: &str, image: &Image, backdrop: &Backdrop) -> PathBuf {
         let path = folder.path().join(name);
-        write(&path, image, background).unwrap();
+        write(&path, image, backdrop).unwrap();
         path
     }
 
@@ -218,7 +228,7 @@ mod tests {
         let folder = folder();
         let mut image = noise(33, 70);
         image.rgba[0] = [-1.5, 1e-40, f32::MAX, 0.0];
-        let path = written(&folder, "a.EXR", &image, Some([1.0; 3]));
+        let path = written(&folder, "a.EXR", &image, &Backdrop::colour([1.0; 3]));
         let bits = |image: &Image| image.rgba.iter().map(|pixel| pixel.map(f32::to_bits)).collect::<Vec<_>>();
         assert_eq!(bits(&read(path).unwrap()), bits(&image));
     }
@@ -229,7 +239,7 @@ mod tests {
         let mut image = Image::new(2, 2);
         // Half covered by linear 0.2, that is sRGB 0.4845; opaque; beyond the range; nothing.
         image.rgba = vec![[0.1, 0.1, 0.0, 0.5], [1.0, 0.0, 0.2, 1.0], [2.0, -1.0, 0.0, 1.0], [0.0; 4]];
-        let decoded = image::open(written(&folder, "a.png", &image, None)).unwrap();
+        let decoded = image::open(written(&folder, "a.png", &image, &Backdrop::default())).unwrap();
         let DynamicImage::ImageRgba8(decoded) = decoded else { panic!("{:?}", decoded.color()) };
         let expected =
             [[124, 124, 0, 128], [255, 0, 124, 255], [255, 0, 0, 255], [0, 0, 0, 0]].as_flattened().to_vec();
@@ -242,16 +252,44 @@ mod tests {
         let mut image = Image::new(2, 1);
         // 0.1 + (1 - 0.5) 0.2 = 0.2 again; nothing, over linear 0.2.
         image.rgba = vec![[0.1, 0.1, 0.1, 0.5], [0.0; 4]];
-        let decoded = image::open(written(&folder, "a.png", &image, Some([0.2; 3]))).unwrap();
+        let decoded = image::open(written(&folder, "a.png", &image, &Backdrop::colour([0.2; 3]))).unwrap();
         let DynamicImage::ImageRgb8(decoded) = decoded else { panic!("{:?}", decoded.color()) };
         assert_eq!(decoded.into_raw(), [124; 6]);
+    }
+
+    #[test]
+    fn png_over_a_picture_is_opaque() {
+        let folder = folder();
+        let mut image = Image::new(2, 1);
+        image.rgba[0] = [0.1, 0.1, 0.1, 0.5];
+        // 0.1 + (1 - 0.5) 0.2 = 0.2; nothing, over 1, 0, 4.
+        let sky = Image { width: 2, height: 1, rgba: vec![[0.2, 0.2, 0.2, 1.0], [1.0, 0.0, 4.0, 1.0]] };
+        let backdrop = Backdrop { behind: Behind::Picture(Arc::new(sky)), exposure: 0.0 };
+        let decoded = image::open(written(&folder, "a.png", &image, &backdrop)).unwrap();
+        let DynamicImage::ImageRgb8(decoded) = decoded else { panic!("{:?}", decoded.color()) };
+        assert_eq!(decoded.into_raw(), [124, 124, 124, 255, 0, 255]);
+    }
+
+    #[test]
+    fn exposure_multiplies_colours_and_leaves_alpha() {
+        let folder = folder();
+        let image = Image { width: 2, height: 1, rgba: vec![[0.025, 0.025, 0.0, 0.5], [0.0; 4]] };
+        let pixels = |backdrop: Backdrop| {
+            let path = written(&folder, "a.png", &image, &Backdrop { exposure: 2.0, ..backdrop });
+            image::open(path).unwrap().into_rgba8().into_raw()
+        };
+        // Straight 0.05 becomes 0.2; what covers half over 0.15 becomes 4 (0.025 + 0.075), or 4 times 0.075 alone.
+        assert_eq!(pixels(Backdrop::default()), [124, 124, 0, 128, 0, 0, 0, 0]);
+        assert_eq!(pixels(Backdrop::colour([0.15; 3])), [170, 170, 149, 255, 203, 203, 203, 255]);
+        let path = written(&folder, "a.exr", &image, &Backdrop { exposure: 2.0, ..Backdrop::default() });
+        assert_eq!(read(path).unwrap(), image);
     }
 
     #[test]
     fn png_comes_back_to_within_its_steps() {
         let folder = folder();
         let image = noise(40, 25);
-        let path = written(&folder, "a.png", &image, None);
+        let path = written(&folder, "a.png", &image, &Backdrop::default());
         let back = read(&path).unwrap();
         // Colour is off by half a step of sRGB, whose slope is at most 2.4 / 1.055, alpha by half a step.
         let bound = 0.5 / 255.0 * (2.4 / 1.055 + 1.0) + 1e-6;
@@ -262,7 +300,7 @@ mod tests {
         }
         assert_eq!(compared, 4 * 40 * 25);
         // What has been rounded once stays.
-        let again = written(&folder, "b.png", &back, None);
+        let again = written(&folder, "b.png", &back, &Backdrop::default());
         assert!(std::fs::read(path).unwrap() == std::fs::read(again).unwrap());
     }
 
@@ -270,10 +308,10 @@ mod tests {
     fn nothing_is_left_but_the_file() {
         let folder = folder();
         let mut image = noise(4, 4);
-        written(&folder, "a.png", &image, None);
+        written(&folder, "a.png", &image, &Backdrop::default());
         let before = std::fs::read(folder.path().join("a.png")).unwrap();
         image.rgba[6][1] = f32::NAN;
-        let error = write(folder.path().join("a.png"), &image, None).unwrap_err();
+        let error = write(folder.path().join("a.png"), &image, &Backdrop::default()).unwrap_err();
         assert!(error.to_string().contains("pixel (2, 1)"), "{error}");
         assert_eq!(std::fs::read(folder.path().join("a.png")).unwrap(), before, "the old file stays");
         check_writable(folder.path().join("new.exr")).unwrap();
@@ -288,7 +326,7 @@ mod tests {
         let mode = |path: PathBuf| std::fs::metadata(path).unwrap().permissions().mode();
         let plain = folder.path().join("plain");
         std::fs::write(&plain, "").unwrap();
-        assert_eq!(mode(written(&folder, "a.png", &noise(2, 2), None)), mode(plain));
+        assert_eq!(mode(written(&folder, "a.png", &noise(2, 2), &Backdrop::default())), mode(plain));
     }
 
     #[test]
@@ -301,7 +339,7 @@ mod tests {
         assert_eq!(missing.exit_code(), 6);
         std::fs::create_dir(folder.path().join("b.png")).unwrap();
         assert_eq!(check_writable(folder.path().join("b.png")).unwrap_err().exit_code(), 6);
-        assert!(write(folder.path().join("b.png"), &noise(2, 2), None).is_err());
+        assert!(write(folder.path().join("b.png"), &noise(2, 2), &Backdrop::default()).is_err());
     }
 
     #[test]
@@ -323,7 +361,7 @@ mod tests {
             read(path).unwrap_err().to_string()
         };
 
-        let path = written(&folder, "a.png", &image, None);
+        let path = written(&folder, "a.png", &image, &Backdrop::default());
         let good = std::fs::read(&path).unwrap();
         let with_size = |width: u32, height: u32| {
             let mut bytes = good.clone();
@@ -337,7 +375,7 @@ mod tests {
         assert!(refusal(&path, &with_size(1 << 15, 1 << 15)).contains("at most 2^28"));
         assert!(refusal(&path, &with_size(1 << 14, 1 << 14)).contains("cannot hold them"));
 
-        let path = written(&folder, "a.exr", &image, None);
+        let path = written(&folder, "a.exr", &image, &Backdrop::default());
         let good = std::fs::read(&path).unwrap();
         for name in ["dataWindow\0box2i\0", "displayWindow\0box2i\0"] {
             let at = good.windows(name.len()).position(|bytes| bytes == name.as_bytes()).unwrap();
@@ -370,7 +408,7 @@ mod tests {
         let mut random = Pcg32::new(13, 13);
         let mut refused = 0;
         for name in ["a.png", "a.exr"] {
-            let path = written(&folder, name, &image, None);
+            let path = written(&folder, name, &image, &Backdrop::default());
             let good = std::fs::read(&path).unwrap();
             for trial in 0..600 {
                 let mut bytes = good.clone();

@@ -1,10 +1,13 @@
 //! What a render yields: linear premultiplied RGBA, depth, and a report of how it was made.
 
+pub mod backdrop;
 pub mod file;
 pub mod image;
+pub(crate) mod lettering;
 pub mod report;
 pub mod srgb;
 
+pub use backdrop::{Backdrop, Behind};
 pub use image::Image;
 pub use report::{Report, Stage, Stopwatch};
 

@@ -10,6 +10,7 @@ use std::path::PathBuf;
 use serde::Deserialize;
 use toml::Spanned;
 
+use super::Background;
 use super::Model;
 use super::PIXEL_FOOTPRINT;
 use super::camera::DEFAULT_FOV_DEGREES;
@@ -18,7 +19,7 @@ use crate::mesh::generate::Generator;
 use crate::mesh::projection::Projection;
 use crate::value::{
     BelowOne, Colour, Exactly, FieldOfView, Finite, Fraction, NotNegative, PictureSize, Pixels, Positive,
-    Rounds, Samples, ShadowSize, Shininess, Step,
+    Rounds, Samples, ShadowSize, Shininess, Step, Stops,
 };
 use crate::volume::{Filter, TransferFunction};
 
@@ -181,7 +182,9 @@ pub struct ImageSection {
     /// Width and height.
     pub size: PictureSize,
     /// What lies behind the shell; a transparent picture without it.
-    pub background: Option<Colour>,
+    pub background: Option<Background>,
+    /// How brightly a PNG shows it.
+    pub exposure: Stops,
 }
 
 /// `[march]`.
@@ -254,7 +257,7 @@ pub enum Plan {
 
 impl Default for ImageSection {
     fn default() -> Self {
-        Self { size: PictureSize([Pixels(512); 2]), background: None }
+        Self { size: PictureSize([Pixels(512); 2]), background: None, exposure: Stops(0.0) }
     }
 }
 
@@ -369,7 +372,7 @@ recipe = "fog.toml"
                 found += 1;
             }
         }
-        assert_eq!(found, 4 + 9 + 5 + 2 + 3 + 10 + 2);
+        assert_eq!(found, 4 + 9 + 5 + 3 + 3 + 10 + 2);
         for (section, count) in [("light", 5), ("solid", 5)] {
             let text = Text::new("keys", format!("{SCENE}[[{section}]]\nunknown_key = 1"), &[]).unwrap();
             let message = text.parse::<SceneFile>(("mesh", "generator")).unwrap_err().to_string();

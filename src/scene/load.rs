@@ -10,8 +10,8 @@ use super::lighting::Lighting;
 use super::solids::Solids;
 use super::source::{MeshSource, VolumeSource};
 use super::text::Text;
-use super::{Camera, March, Medium, Scene, Sizes, View, span, texel_edges};
-use crate::frame::{Stage, Stopwatch};
+use super::{Camera, March, Medium, Scene, Sizes, View, backdrop, span, texel_edges};
+use crate::frame::{Backdrop, Stage, Stopwatch};
 use crate::progress::{Progress, Silent};
 use crate::shell::{Shell, ShellOptions};
 use crate::value::{Exactly, Finite};
@@ -23,8 +23,8 @@ use crate::{Error, Result, input};
 pub struct Loaded {
     /// What a method renders.
     pub scene: Scene,
-    /// Linear RGB on which the picture is laid; `None` leaves it transparent.
-    pub background: Option<[f32; 3]>,
+    /// What a picture for people is laid on.
+    pub backdrop: Backdrop,
     /// What loading cost.
     pub stages: Vec<Stage>,
 }
@@ -80,6 +80,7 @@ fn build(
     let volume = VolumeSource::of(text, &file.volume, base_dir)?;
     let lighting = Lighting::of(text, &file, base_dir)?;
     let solids = Solids::read(text, file.base.as_ref(), &file.solid, base_dir)?;
+    let backdrop = backdrop::read(&file.image, base_dir)?;
     let [width, height] = file.image.size.0.map(|pixels| pixels.0);
     let admit = |volume| admit(&Sizes { picture: [width, height], volume });
     if let VolumeSource::Recipe(recipe) = &volume {
@@ -156,8 +157,7 @@ fn build(
         shell,
         volume,
     };
-    let background = file.image.background.map(|colour| colour.0.to_array());
-    Ok(Loaded { scene, background, stages: stopwatch.finish() })
+    Ok(Loaded { scene, backdrop, stages: stopwatch.finish() })
 }
 
 /// The camera, whose axes are checked to exist.
@@ -217,10 +217,10 @@ recipe = "fog.toml"
 
     #[test]
     fn what_is_left_out_has_its_default() {
-        let Loaded { scene, background, .. } = parse("scene.toml", SCENE, folder().path()).unwrap();
+        let Loaded { scene, backdrop, .. } = parse("scene.toml", SCENE, folder().path()).unwrap();
         let expected = Scene::new(scene.shell.clone(), scene.volume.clone(), 0.1 / 4.0);
         assert_eq!((scene.view, scene.medium, scene.march), (expected.view, expected.medium, expected.march));
-        assert_eq!(background, None);
+        assert_eq!(backdrop, Backdrop::default());
     }
 
     #[test]
@@ -235,13 +235,13 @@ recipe = "fog.toml"
             "camera={eye=[0,0,9],target=[0,0,0],fov=90}",
             "camera.near = 2",
         ];
-        let Loaded { scene, background, .. } = loaded(&overrides).unwrap();
+        let Loaded { scene, backdrop, .. } = loaded(&overrides).unwrap();
         assert_eq!(scene.shell.topology.tetrahedra.len(), 3 * 2 * 8 * 5);
         assert_eq!(scene.medium.opacity_distance, 1.0);
         assert_eq!(scene.march, March::Paper { samples: 3 });
-        assert_eq!(background, Some([0.0, 0.5, 1.0]));
-        let background = loaded(&["image.background=#ff0000"]).unwrap().background;
-        assert_eq!(background, Some([1.0, 0.0, 0.0]));
+        assert_eq!(backdrop, Backdrop::colour([0.0, 0.5, 1.0]));
+        let backdrop = loaded(&["image.background=#ff0000", "image.exposure=1"]).unwrap().backdrop;
+        assert_eq!(backdrop, Backdrop { exposure: 1.0, ..Backdrop::colour([1.0, 0.0, 0.0]) });
         assert_eq!((scene.view.camera.eye.z, scene.view.camera.near), (9.0, 2.0));
         assert_eq!(scene.view.camera.fov_y, std::f64::consts::FRAC_PI_2);
         // A row of the five spans a fifth of the texture's 3.5 repeats.

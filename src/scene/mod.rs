@@ -17,6 +17,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod backdrop;
 pub mod camera;
 pub mod file;
 mod lighting;
@@ -29,6 +30,7 @@ mod source;
 pub mod span;
 pub(crate) mod text;
 
+pub use backdrop::Background;
 pub use camera::{Camera, View};
 pub use load::{Loaded, load, load_if, parse};
 pub use shading::{Emission, Light, Model, Shading, Source};

@@ -7,7 +7,7 @@ use glam::{DVec2, DVec3};
 use super::compare::{ROUNDING, Transmittance, transmittance};
 use super::scenes::{columns, connected, constant_scene, painted, view};
 use super::{Case, Stand, alpha};
-use crate::frame::{Image, file};
+use crate::frame::{Backdrop, Image, file};
 use crate::mesh::generate::{Generator, Plane, Torus};
 use crate::reference::Reference;
 use crate::scene::{March, Medium, Scene, View};
@@ -103,7 +103,7 @@ fn clear(stand: &Stand<'_>) -> Result<f64> {
     let folder = tempfile::tempdir().map_err(unwritable)?;
     let laid = |name: &str, image: &Image| {
         let path = folder.path().join(name);
-        file::write(&path, image, Some([0.2, 0.5, 0.9]))?;
+        file::write(&path, image, &Backdrop::colour([0.2, 0.5, 0.9]))?;
         file::read(&path)
     };
     let [over, background] = [laid("over.png", &image)?, laid("background.png", &empty)?];

@@ -9,5 +9,5 @@ pub use list::Exactly;
 pub(crate) use list::exactly;
 pub use number::{
     BelowOne, FieldOfView, Finite, Fraction, NotNegative, PictureSize, Pixels, Positive, Rounds, Runs,
-    Samples, ShadowSize, Shininess, Step,
+    Samples, ShadowSize, Shininess, Step, Stops,
 };

@@ -98,6 +98,10 @@ number! {
     BelowOne = "a number from 0 to 1, excluding 1", |value| (0.0..1.0).contains(&value)
 }
 number! {
+    /// An exposure: each stop is twice as bright.
+    Stops = "a number of stops from -20 to 20", |value| (-20.0..=20.0).contains(&value)
+}
+number! {
     /// An angle in degrees, above 0 and below 180.
     FieldOfView = "an angle in degrees between 0 and 180, both excluded", |value| value > 0.0 && value < 180.0
 }

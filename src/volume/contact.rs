@@ -1,9 +1,8 @@
 //! A contact sheet: slices of a volume over a checkerboard, each under a line that says where it is.
 
-use font8x8::legacy::BASIC_LEGACY;
-
 use super::{Quantity, Volume};
 use crate::frame::Image;
+use crate::frame::lettering::Letters;
 
 /// Pixels between slices, and around all.
 pub(super) const GAP: u32 = 8;
@@ -19,7 +18,7 @@ const MOST_SLICES: u32 = 8;
 /// The sheet's own grey, and the checkerboard's two, linear.
 pub(super) const PAPER: f32 = 0.02;
 const CHECKER: [f32; 2] = [0.12, 0.2];
-const INK: f32 = 0.7;
+pub(super) const INK: f32 = 0.7;
 
 /// Texels that lie in a plane, by their columns from the left and rows from the bottom.
 struct Slice<'a> {
@@ -91,7 +90,7 @@ fn draw(
     [left, top]: [u32; 2],
     [width, height]: [u32; 2],
 ) {
-    write(sheet, &slice.label, [left, top]);
+    Letters::Small.write(sheet, &slice.label, [left, top], INK);
     let pixels = (f64::from(width) / f64::from(slice.columns)).min(f64::from(height) / f64::from(slice.rows));
     let [across, down] =
         [slice.columns, slice.rows].map(|texels| ((f64::from(texels) * pixels) as u32).max(1));
@@ -110,20 +109,6 @@ fn draw(
             };
             let behind = CHECKER[((x / 8 + y / 8) % 2) as usize] * (1.0 - opacity);
             *pixel(sheet, left + x, top + LINE + y) = [r + behind, g + behind, b + behind, 1.0];
-        }
-    }
-}
-
-/// Writes ASCII, eight pixels a letter.
-pub(super) fn write(sheet: &mut Image, text: &str, [left, top]: [u32; 2]) {
-    for (letter, x) in text.bytes().zip((left..).step_by(8)) {
-        let glyph = BASIC_LEGACY[usize::from(letter & 0x7f)];
-        for (row, y) in glyph.into_iter().zip(top..) {
-            for column in (0..8).filter(|column| row >> column & 1 == 1) {
-                if x + column < sheet.width {
-                    *pixel(sheet, x + column, y) = [INK, INK, INK, 1.0];
-                }
-            }
         }
     }
 }

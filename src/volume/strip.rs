@@ -1,7 +1,8 @@
 //! A strip: pictures beside one another, each over a line that says what it shows.
 
-use super::contact::{GAP, LINE, PAPER, write};
+use super::contact::{GAP, INK, LINE, PAPER};
 use crate::frame::Image;
+use crate::frame::lettering::Letters;
 
 /// Pictures with their labels from the left to the right, over a linear grey.
 pub fn strip(pictures: &[(String, Image)], grey: f32) -> Image {
@@ -19,7 +20,7 @@ pub fn strip(pictures: &[(String, Image)], grey: f32) -> Image {
                 *to = [r + behind, g + behind, b + behind, 1.0];
             }
         }
-        write(&mut strip, label, [left, 2 * GAP + height - 3]);
+        Letters::Small.write(&mut strip, label, [left, 2 * GAP + height - 3], INK);
         left += picture.width + GAP;
     }
     strip

@@ -106,7 +106,7 @@ fn section(page: &mut String, results: &Results, scene: &SceneResults, pictures:
                 page,
                 "<figure><img class=\"pixels\" src=\"{}\" width=\"{}\" height=\"{}\" \
                  alt=\"{caption}\"><figcaption>{caption}</figcaption></figure>",
-                data_uri(image, pictures.background),
+                data_uri(image, &pictures.backdrop),
                 image.width,
                 image.height
             );

@@ -11,7 +11,7 @@ use crate::bench::file::write_whole;
 use crate::bench::fingerprint::Fingerprint;
 use crate::bench::sweep::overrides;
 use crate::bench::{Environment, Options};
-use crate::frame::Image;
+use crate::frame::{Backdrop, Image};
 use crate::gpu::Gpu;
 use crate::method::{METHODS, Setup};
 use crate::progress::{Progress, Silent};
@@ -41,8 +41,8 @@ pub struct Pictures {
     pub references: Vec<Image>,
     /// By each filter, from each distance.
     pub filtered: Vec<Vec<Image>>,
-    /// On which they are laid, linear RGB.
-    pub background: Option<[f32; 3]>,
+    /// On which they are laid.
+    pub backdrop: Backdrop,
 }
 
 /// Measures a sweep and writes `antialiasing.json`, `antialiasing.csv` and `antialiasing.html`. References are kept, so that an
@@ -69,7 +69,7 @@ pub fn run(sweep: &Sweep, options: &Options<'_>, setup: &Setup<'_>) -> Result<Ou
         let bench = Bench { sweep, options, setup, done: (index, sweep.scenes.len()) };
         let scene = Scene { march: March::Default { step: sweep.step }, ..loaded.scene };
         let mut of_scene = SceneResults { scene: path.clone(), pictures: Vec::new() };
-        pictures.push(bench.measure(scene, loaded.background, &mut of_scene, &mut warnings)?);
+        pictures.push(bench.measure(scene, loaded.backdrop, &mut of_scene, &mut warnings)?);
         results.scenes.push(of_scene);
     }
     results.means = results::means(sweep, &results.scenes);
@@ -98,7 +98,7 @@ impl Bench<'_> {
     fn measure(
         &self,
         mut scene: Scene,
-        background: Option<[f32; 3]>,
+        backdrop: Backdrop,
         results: &mut SceneResults,
         warnings: &mut Vec<String>,
     ) -> Result<Pictures> {
@@ -131,12 +131,12 @@ impl Bench<'_> {
             let images =
                 views.iter().map(|view| Ok(method.render(view)?.image)).collect::<Result<Vec<_>>>()?;
             for ((image, reference), picture) in images.iter().zip(&references).zip(&mut results.pictures) {
-                let error = metric::compare_over(image, reference, background.unwrap_or_default())?.metrics;
+                let error = metric::compare_over(image, reference, backdrop.flat_colour())?.metrics;
                 picture.points.push(Point::new(filter, error, image, reference));
             }
             filtered.push(images);
         }
-        Ok(Pictures { references, filtered, background })
+        Ok(Pictures { references, filtered, backdrop })
     }
 
     /// The picture of many rays a pixel, from the cache where it is there.

@@ -7,7 +7,7 @@ use super::{error_names, error_title, plot};
 use crate::bench::measure::Pictures;
 use crate::bench::results::{Curve, Point, SceneResults};
 use crate::bench::{Environment, Results};
-use crate::frame::Image;
+use crate::frame::{Backdrop, Image};
 
 const STYLE: &str = include_str!("style.css");
 
@@ -150,16 +150,16 @@ fn error_text(point: &Point, name: &str) -> String {
 fn gallery(page: &mut String, scene: &SceneResults, pictures: &Pictures) {
     let reference = thumbnail(&pictures.reference);
     *page += "<div class=\"gallery\">\n";
-    let shown = |page: &mut String, image: &Image, background, caption: &str| {
+    let shown = |page: &mut String, image: &Image, backdrop: &Backdrop, caption: &str| {
         let _ = writeln!(
             page,
             "<figure><img src=\"{}\" width=\"{}\" height=\"{}\" alt=\"{caption}\"><figcaption>{caption}</figcaption>",
-            data_uri(image, background),
+            data_uri(image, backdrop),
             image.width,
             image.height
         );
     };
-    shown(page, &reference, pictures.background, "reference");
+    shown(page, &reference, &pictures.backdrop, "reference");
     *page += "</figure>\n";
     for ((index, image), title) in scene
         .best_and_worst()
@@ -170,10 +170,10 @@ fn gallery(page: &mut String, scene: &SceneResults, pictures: &Pictures) {
         let point = &scene.points[index];
         let quality = point.setting.march;
         let image = thumbnail(image);
-        shown(page, &image, pictures.background, &format!("{title}: {quality}"));
+        shown(page, &image, &pictures.backdrop, &format!("{title}: {quality}"));
         *page += "</figure>\n";
-        let ErrorMap { image: map, range } = error_map(&image, &reference, pictures.background);
-        shown(page, &map, None, &format!("its error in luminance: {quality}"));
+        let ErrorMap { image: map, range } = error_map(&image, &reference, pictures.backdrop.flat_colour());
+        shown(page, &map, &Backdrop::default(), &format!("its error in luminance: {quality}"));
         let _ = writeln!(
             page,
             "<div class=\"range\"><span>−{range:e} darker</span><i></i><span>brighter +{range:e}</span></div></figure>"
@@ -219,7 +219,7 @@ mod tests {
         let reference = Image::new(2, 2);
         let mut wrong = reference.clone();
         wrong.rgba[1] = [0.3; 4];
-        Pictures { best_and_worst: [reference.clone(), wrong], reference, background: None }
+        Pictures { best_and_worst: [reference.clone(), wrong], reference, backdrop: Backdrop::default() }
     }
 
     #[test]

@@ -3,9 +3,9 @@
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 
-use crate::frame::Image;
 use crate::frame::file::write_png;
 use crate::frame::srgb::linear_from_srgb;
+use crate::frame::{Backdrop, Image};
 use crate::metric::map::{luminance_differences, natural_range};
 
 /// The longest side of an embedded picture, in pixels.
@@ -16,10 +16,10 @@ pub const TOO_DARK: [u8; 3] = [0x2a, 0x78, 0xd6];
 /// See [`TOO_DARK`].
 pub const TOO_BRIGHT: [u8; 3] = [0xe3, 0x49, 0x48];
 
-/// A picture as a `data:` URI; without a background what is transparent stays so.
-pub fn data_uri(image: &Image, background: Option<[f32; 3]>) -> String {
+/// A picture as a `data:` URI; with nothing behind it what is transparent stays so.
+pub fn data_uri(image: &Image, backdrop: &Backdrop) -> String {
     let mut png = Vec::new();
-    write_png(&mut png, image, background).expect("memory takes any picture");
+    write_png(&mut png, image, backdrop).expect("memory takes any picture");
     format!("data:image/png;base64,{}", STANDARD.encode(png))
 }
 
@@ -54,9 +54,9 @@ pub struct ErrorMap {
     pub range: f32,
 }
 
-/// Compares two pictures of one size, both over `background`, or black.
-pub fn error_map(image: &Image, reference: &Image, background: Option<[f32; 3]>) -> ErrorMap {
-    let differences = luminance_differences(image, reference, background.unwrap_or_default());
+/// Compares two pictures of one size, both over `background`, linear RGB.
+pub fn error_map(image: &Image, reference: &Image, background: [f32; 3]) -> ErrorMap {
+    let differences = luminance_differences(image, reference, background);
     let differences = differences.expect("pictures of one scene have one size");
     let range = rounded_up(natural_range(&differences));
     let colour = |difference: &f32| {
@@ -92,14 +92,14 @@ mod tests {
             *pixel = [0.2, 0.2, 0.2, 1.0];
         }
         image.rgba[1500] = [0.65, 0.65, 0.65, 1.0];
-        let map = error_map(&image, &reference, None);
+        let map = error_map(&image, &reference, [0.0; 3]);
         assert_eq!(map.range, 0.5);
         let [r, _, b, alpha] = map.image.rgba[0];
         assert!((alpha - 0.6).abs() < 1e-6 && b > r, "dark is blue");
         let [r, _, b, alpha] = map.image.rgba[1500];
         assert!((alpha - 0.3).abs() < 1e-6 && r > b, "bright is red");
         assert_eq!(map.image.rgba[1999], [0.0; 4]);
-        let same = error_map(&image, &image, None);
+        let same = error_map(&image, &image, [0.0; 3]);
         assert!(same.range == 1.0 && same.image.rgba.iter().all(|pixel| *pixel == [0.0; 4]));
     }
 
@@ -128,7 +128,7 @@ mod tests {
     fn a_uri_holds_the_png() {
         let mut image = Image::new(2, 1);
         image.rgba = vec![[1.0; 4], [0.0; 4]];
-        let uri = data_uri(&image, None);
+        let uri = data_uri(&image, &Backdrop::default());
         let png = STANDARD.decode(uri.strip_prefix("data:image/png;base64,").unwrap()).unwrap();
         let back = image::load_from_memory(&png).unwrap().into_rgba8();
         assert_eq!(back.into_raw(), [255, 255, 255, 255, 0, 0, 0, 0]);

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use clap::Args;
-use mesoshell::frame::{Image, file};
+use mesoshell::frame::{Backdrop, Image, file};
 use mesoshell::gpu::DeviceChoice;
 use mesoshell::mesh::generate::{Generator, Plane};
 use mesoshell::method::{METHODS, Setup};
@@ -105,7 +105,7 @@ pub fn run(arguments: &Arguments, talk: Talk) -> Result<()> {
         volume::strip(&pictures, BACKGROUND)
     };
     progress.stage("writing the picture");
-    file::write(output, &picture, Some([BACKGROUND; 3]))?;
+    file::write(output, &picture, &Backdrop::colour([BACKGROUND; 3]))?;
     drop(progress); // The progress line is wiped before anything else is said.
     let told = Previewed { output: output.clone(), width: picture.width, height: picture.height };
     talk.result(&told, || output.display().to_string())
