@@ -28,8 +28,9 @@ keys! {
         elongation: f32 = 0.5, 0.0..=0.9;
         /// Opacity of a path as long as the shell is thick, inside an ellipsoid.
         alpha: f32 = 0.995, 0.0..=0.9999999;
-        /// How much denser the ellipsoids are towards their surface: 0 is even, 1 hollow.
-        rim: f32 = 0.6, 0.0..=1.0;
+        /// How much denser the ellipsoids are towards their surface: 0 is even, 1 hollow; below 0 they are denser towards
+        /// their heart, so that normals derived from them point outwards however deep one sees into them.
+        rim: f32 = 0.6, -2.0..=1.0;
         /// Opacity of a straight path across the shell through the medium alone.
         medium_alpha: f32 = 0.3, 0.0..=0.9999999;
         /// How uneven the medium is.
@@ -118,8 +119,7 @@ impl Ellipsoids {
 
     /// The texel of a point inside an ellipsoid.
     fn jelly(&self, ellipsoid: &Ellipsoid, place: &Place, grid: &Grid) -> [f32; 4] {
-        let outer = smoothstep(0.4, 1., place.radius);
-        let density = 1. - self.rim * (1. - outer);
+        let density = 1. - self.rim * (1. - place.radius * place.radius).max(0.);
         let light = 1. - self.occlusion * smoothstep(0.9, -0.9, place.outward.z * place.radius.min(1.));
         let gleam = smoothstep(0.9, 1., place.outward.dot(Vec3::new(0.25, 0.3, 0.9).normalize()));
         let shine = self.shine * gleam * smoothstep(0.6, 0.9, place.radius);
