@@ -201,7 +201,10 @@ fn densities_are_interpolated_as_extinction() {
         assert!(midpoints.rmse <= 2e-3 && midpoints.rmse > 10.0 * exact.rmse, "{midpoints:?}");
         // Read as an opacity the same numbers are another medium.
         let mut opacity = scene.clone();
-        opacity.volume.levels.iter_mut().for_each(|level| level.quantity = Quantity::Opacity);
+        std::sync::Arc::make_mut(&mut opacity.volume)
+            .levels
+            .iter_mut()
+            .for_each(|level| level.quantity = Quantity::Opacity);
         let pictures = [&scene, &opacity]
             .map(|scene| Watched::prepare("shell", &Arc::new(scene.clone())).render(&scene.view).image);
         let other = metric::compare(&pictures[0], &pictures[1]).unwrap();

@@ -67,7 +67,7 @@ fn light_up(scene: &mut Scene, ambient: f64, lights: Vec<Light>) {
         emission: Emission { glow: 0.0, from: 0.0 },
         shadow_size: 256,
         lights,
-        directions: Directions::normals(&scene.volume.levels[0]),
+        directions: Directions::normals(&scene.volume.levels[0]).into(),
     });
 }
 
@@ -82,7 +82,12 @@ fn lamp(position: DVec3, brightness: f64) -> Light {
 }
 
 fn solid(mesh: Mesh, colour: DVec3) -> Solid {
-    Solid { mesh, colour, texture: None }
+    Solid { mesh: mesh.into(), colour, texture: None }
+}
+
+/// Of the first solid, to be changed.
+fn solid_mesh(scene: &mut Scene) -> &mut Mesh {
+    Arc::make_mut(&mut Arc::make_mut(&mut scene.solids)[0].mesh)
 }
 
 fn ball(centre: DVec3, radius: f64, colour: DVec3) -> Solid {
@@ -112,7 +117,7 @@ fn a_ball_half_sunk_in_fog_is_its_closed_form() {
     let (height, extinction, radius) = (0.5, 1.5, 0.5);
     let mut scene = slab(20.0, height, extinction, [0.5, 0.6, 0.7], view);
     let centre = DVec3::new(0.1, height, -0.2);
-    scene.solids = vec![ball(centre, radius, DVec3::new(0.9, 0.2, 0.1))];
+    scene.solids = [ball(centre, radius, DVec3::new(0.9, 0.2, 0.1))].into();
     scene.view.depth = true;
     let frame = render(&scene);
     let closed = |ray: DVec3, radius: f64| {
@@ -146,8 +151,8 @@ fn a_ball_half_sunk_in_fog_is_its_closed_form() {
     assert!(compared[0] > 4000 && compared[1] > 900, "{compared:?}");
     // Without the ball, or with it elsewhere, it is another picture.
     let mut others = vec![scene.clone(); 2];
-    others[0].solids.clear();
-    others[1].solids[0].mesh.positions.iter_mut().for_each(|position| position.y -= 0.1);
+    others[0].solids = [].into();
+    solid_mesh(&mut others[1]).positions.iter_mut().for_each(|position| position.y -= 0.1);
     for other in &others {
         assert!(rmse(&render(other).image, &frame.image) > 0.02);
     }
@@ -207,10 +212,11 @@ fn a_plate_casts_its_shadow_where_the_light_says() {
     let view = view(eye, DVec3::ZERO, 60.0, 1e-3, 128);
     // Fog so thin that it does not count, far below.
     let mut scene = slab(0.1, 0.01, 1e-6, [1.0; 3], view);
-    scene.solids = vec![
+    scene.solids = [
         plate(DVec3::new(0.0, 0.2, 0.0), 6.0, DVec3::ONE),
         plate(DVec3::new(0.0, 1.2, 0.0), 0.8, DVec3::ONE),
-    ];
+    ]
+    .into();
     let lights = [sun(DVec3::new(-1.0, 1.0, 0.0), 1.0), lamp(DVec3::new(0.5, 2.2, 1.0), 1.0)];
     for (index, light) in lights.into_iter().enumerate() {
         light_up(&mut scene, 0.0, vec![light]);
@@ -291,7 +297,7 @@ fn ring() -> Scene {
     let volume = Volume::new([8, 8, 4], (0..256).map(texel).collect()).unwrap();
     let mut scene = Scene::new(shell, Pyramid::build(volume), 0.06);
     scene.view = view(DVec3::new(0.5, 3.0, 3.2), DVec3::ZERO, 40.0, 1e-3, 40);
-    scene.solids = vec![ball(DVec3::new(0.4, 0.7, 0.9), 0.35, DVec3::new(0.8, 0.3, 0.2))];
+    scene.solids = [ball(DVec3::new(0.4, 0.7, 0.9), 0.35, DVec3::new(0.8, 0.3, 0.2))].into();
     light_up(
         &mut scene,
         0.1,
@@ -317,13 +323,13 @@ fn shadows_agree_with_the_reference() {
     let changes: [(&str, Change); 6] = [
         ("the sun's shadow", |scene| scene.shading.as_mut().unwrap().lights[0].shadow = false),
         ("the lamp's shadow", |scene| scene.shading.as_mut().unwrap().lights[1].shadow = false),
-        ("the ball", |scene| scene.solids.clear()),
+        ("the ball", |scene| scene.solids = [].into()),
         ("where the sun is", |scene| {
             let towards = DVec3::new(-0.3, 1.0, 0.4).normalize();
             scene.shading.as_mut().unwrap().lights[0].source = Source::Directional { towards };
         }),
         ("the ball's place", |scene| {
-            scene.solids[0].mesh.positions.iter_mut().for_each(|position| position.z = -position.z);
+            solid_mesh(scene).positions.iter_mut().for_each(|position| position.z = -position.z);
         }),
         ("how dense the fog is", |scene| scene.medium.opacity_distance *= 1.1),
     ];
@@ -353,8 +359,8 @@ fn textured_solids_agree_with_the_reference() {
     let texel =
         |i: u32| [if i & 1 == 0 { 1.0 } else { 0.2 }, (i / 16) as f32 / 8.0, (i % 16) as f32 / 16.0, 1.0];
     let texture = Volume::new([16, 8, 1], (0..128).map(texel).collect()).unwrap();
-    scene.solids =
-        vec![Solid { mesh, colour: DVec3::new(0.9, 0.8, 0.7), texture: Some(Pyramid::build(texture)) }];
+    let texture = Some(Pyramid::build(texture).into());
+    scene.solids = [Solid { mesh: mesh.into(), colour: DVec3::new(0.9, 0.8, 0.7), texture }].into();
     // There is next to nothing before it.
     scene.medium.opacity_distance = 1e9;
     let exact = reference(&scene);
@@ -373,7 +379,7 @@ fn textured_solids_agree_with_the_reference() {
     assert!(nearly_all < 2e-5, "{nearly_all}");
     for u in [1.0, 0.5] {
         let mut shifted = scene.clone();
-        for uv in shifted.solids[0].mesh.uvs.iter_mut().flatten() {
+        for uv in solid_mesh(&mut shifted).uvs.iter_mut().flatten() {
             uv.x = if u == 1.0 { -uv.x } else { uv.x + u };
         }
         assert!(rmse(&render(&shifted).image, &exact) > 0.02);

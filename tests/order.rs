@@ -1,6 +1,7 @@
 //! Visibility orders, checked along every pixel's ray of many views.
 
 use std::f64::consts::TAU;
+use std::sync::Arc;
 
 use glam::DVec3;
 use mesoshell::mesh::Mesh;
@@ -292,7 +293,7 @@ fn far_tiny_and_huge_shells_are_in_order() {
         let shell = shell(&mesh, 0.15 * scale);
         let offset = DVec3::new(1.0, -0.7, 0.3) * offset;
         let mut placed = shell.clone();
-        placed.vertices.iter_mut().for_each(|v| *v += offset);
+        Arc::make_mut(&mut placed.vertices).iter_mut().for_each(|v| *v += offset);
         for i in 0..8 {
             let mut view = random_view(&shell, i % 4, &mut random);
             view.camera.eye += offset;

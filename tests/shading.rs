@@ -87,7 +87,7 @@ fn slab(linear: DMat3, alpha: f32, model: Model, direction: DVec3) -> Scene {
         emission: Emission { glow: 0.0, from: 0.0 },
         shadow_size: 64,
         lights: lights.map(|(source, colour)| Light { source, colour, shadow: false }).to_vec(),
-        directions,
+        directions: directions.into(),
     });
     scene
 }
@@ -309,7 +309,7 @@ fn agrees_with_the_reference(name: &str) {
             2 => shading.specular = 0.0,
             3 => shading.diffuse = 0.5,
             _ => {
-                let levels = shading.directions.levels.iter_mut();
+                let levels = Arc::make_mut(&mut shading.directions).levels.iter_mut();
                 levels.flat_map(|level| &mut level.texels).for_each(|texel| texel[0] = -texel[0]);
             }
         }
@@ -371,8 +371,8 @@ fn a_mirrored_world_looks_mirrored() {
         let scene = load(name, &["image.size=[96, 96]", "march.step=0.25"]);
         let flip = |v: DVec3| DVec3::new(-v.x, v.y, v.z);
         let mut mirrored = scene.clone();
-        let shell_of = &mut mirrored.shell;
-        shell_of.vertices.iter_mut().for_each(|vertex| *vertex = flip(*vertex));
+        let shell_of = Arc::make_mut(&mut mirrored.shell);
+        Arc::make_mut(&mut shell_of.vertices).iter_mut().for_each(|vertex| *vertex = flip(*vertex));
         // Tetrahedra of positive volume stay so: two vertices change places.
         let mut topology = (*shell_of.topology).clone();
         for t in 0..topology.tetrahedra.len() {

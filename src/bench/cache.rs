@@ -177,7 +177,7 @@ mod tests {
         assert_eq!(first.milliseconds, second.milliseconds);
 
         let mut changed = scene.clone();
-        changed.volume.levels[0].texels[3][0] += 0.01;
+        std::sync::Arc::make_mut(&mut changed.volume).levels[0].texels[3][0] += 0.01;
         let (third, warnings) = get(&changed, folder.path());
         assert!(!third.reused && warnings.is_empty());
         assert_ne!(first.image, third.image);

@@ -105,7 +105,7 @@ fn seen(mut builder: Builder, scene: &Scene, view: &View, levels: &[Volume]) -> 
         .numbers(&[camera.eye, camera.target, camera.up])
         .numbers(&[*width, *height])
         .numbers(&scene.shell.topology.tetrahedra)
-        .numbers(&scene.shell.vertices)
+        .numbers(scene.shell.vertices.as_slice())
         .numbers(&scene.shell.texture);
     for cell in &scene.shell.cells {
         builder = builder.numbers(&cell.gradients).numbers(&[cell.texture_from_world]);
@@ -117,7 +117,7 @@ fn seen(mut builder: Builder, scene: &Scene, view: &View, levels: &[Volume]) -> 
         };
         builder = builder.bytes(quantity.as_bytes()).numbers(&level.size).numbers(&level.texels);
     }
-    for Solid { mesh, colour, texture } in &scene.solids {
+    for Solid { mesh, colour, texture } in scene.solids.iter() {
         let levels = texture.as_ref().map_or(&[][..], |texture| &texture.levels);
         builder = builder
             .numbers(&mesh.positions)
@@ -178,6 +178,8 @@ fn lit(builder: Builder, scene: &Scene, shading: &Shading, levels: &[DirectionLe
 
 #[cfg(test)]
 pub(crate) mod tests {
+    use std::sync::Arc;
+
     use glam::DVec3;
 
     use super::*;
@@ -197,17 +199,28 @@ pub(crate) mod tests {
         scene
     }
 
+    fn shell(scene: &mut Scene) -> &mut Shell {
+        Arc::make_mut(&mut scene.shell)
+    }
+
+    fn volume(scene: &mut Scene) -> &mut Pyramid {
+        Arc::make_mut(&mut scene.volume)
+    }
+
     /// A change, and its name for the failure's sake.
     type Change = (&'static str, fn(&mut Scene));
 
     const CHANGES: &[Change] = &[
-        ("a vertex", |scene| scene.shell.vertices[3].y = scene.shell.vertices[3].y.next_up()),
-        ("a texture coordinate", |scene| scene.shell.texture[7][2].z += 1e-15),
-        ("a cell", |scene| scene.shell.cells[5].texture_from_world.x_axis.x += 1e-9),
-        ("a texel of the first level", |scene| scene.volume.levels[0].texels[6][1] += 1e-6),
-        ("a texel of the last level", |scene| scene.volume.levels[1].texels[0][3] += 1e-6),
-        ("the shape of a level", |scene| scene.volume.levels[0].size = [1, 2, 4]),
-        ("what alpha is", |scene| scene.volume.levels[0].quantity = Quantity::Extinction),
+        ("a vertex", |scene| {
+            let vertex = &mut Arc::make_mut(&mut shell(scene).vertices)[3];
+            vertex.y = vertex.y.next_up();
+        }),
+        ("a texture coordinate", |scene| shell(scene).texture[7][2].z += 1e-15),
+        ("a cell", |scene| shell(scene).cells[5].texture_from_world.x_axis.x += 1e-9),
+        ("a texel of the first level", |scene| volume(scene).levels[0].texels[6][1] += 1e-6),
+        ("a texel of the last level", |scene| volume(scene).levels[1].texels[0][3] += 1e-6),
+        ("the shape of a level", |scene| volume(scene).levels[0].size = [1, 2, 4]),
+        ("what alpha is", |scene| volume(scene).levels[0].quantity = Quantity::Extinction),
         ("the opacity distance", |scene| scene.medium.opacity_distance *= 2.0),
         ("the level of detail", |scene| scene.medium.lod_footprint = 0.0),
         ("the eye", |scene| scene.view.camera.eye.x += 1e-9),
@@ -245,7 +258,7 @@ pub(crate) mod tests {
             emission: Emission { glow: 0.0, from: 0.0 },
             shadow_size: 64,
             lights: [sun, lamp].map(|source| Light { source, colour: DVec3::ONE, shadow: false }).to_vec(),
-            directions: Directions::normals(&scene.volume.levels[0]),
+            directions: Arc::new(Directions::normals(&scene.volume.levels[0])),
         };
         Scene { shading: Some(shading), ..scene }
     }
@@ -274,8 +287,8 @@ pub(crate) mod tests {
         ("the glow", |shading| shading.emission.glow = 0.5),
         ("where the glow begins", |shading| shading.emission.from = 0.5),
         ("a light less", |shading| shading.lights.truncate(1)),
-        ("a normal", |shading| shading.directions.levels[0].texels[3][1] += 1e-6),
-        ("a coarser normal", |shading| shading.directions.levels[1].texels[0][2] += 1e-6),
+        ("a normal", |shading| Arc::make_mut(&mut shading.directions).levels[0].texels[3][1] += 1e-6),
+        ("a coarser normal", |shading| Arc::make_mut(&mut shading.directions).levels[1].texels[0][2] += 1e-6),
     ];
 
     #[test]
@@ -294,22 +307,26 @@ pub(crate) mod tests {
     /// The same beside a triangle with a texture.
     fn solid() -> Scene {
         let texture = Volume::new([2, 1, 1], vec![[0.5, 0.25, 0.0, 1.0]; 2]).unwrap();
-        let solid =
-            Solid { mesh: Mesh::triangle(), colour: DVec3::ONE, texture: Some(Pyramid::build(texture)) };
-        Scene { solids: vec![solid], ..scene() }
+        let texture = Some(Arc::new(Pyramid::build(texture)));
+        let solid = Solid { mesh: Arc::new(Mesh::triangle()), colour: DVec3::ONE, texture };
+        Scene { solids: [solid].into(), ..scene() }
+    }
+
+    fn texture(solid: &mut Solid) -> &mut Pyramid {
+        Arc::make_mut(solid.texture.as_mut().unwrap())
     }
 
     /// A change of the solid, and its name for the failure's sake.
     type Reshape = (&'static str, fn(&mut Solid));
 
     const SOLIDS: &[Reshape] = &[
-        ("a position", |solid| solid.mesh.positions[1].x += 1e-9),
-        ("a normal", |solid| solid.mesh.normals[2].x += 1e-9),
-        ("the order of corners", |solid| solid.mesh.triangles[0] = [1, 2, 0]),
-        ("texture coordinates", |solid| solid.mesh.uvs[0][1].y += 1e-9),
+        ("a position", |solid| Arc::make_mut(&mut solid.mesh).positions[1].x += 1e-9),
+        ("a normal", |solid| Arc::make_mut(&mut solid.mesh).normals[2].x += 1e-9),
+        ("the order of corners", |solid| Arc::make_mut(&mut solid.mesh).triangles[0] = [1, 2, 0]),
+        ("texture coordinates", |solid| Arc::make_mut(&mut solid.mesh).uvs[0][1].y += 1e-9),
         ("the colour", |solid| solid.colour.y = 0.5),
-        ("a texel", |solid| solid.texture.as_mut().unwrap().levels[0].texels[1][0] += 1e-6),
-        ("a coarser texel", |solid| solid.texture.as_mut().unwrap().levels[1].texels[0][0] += 1e-6),
+        ("a texel", |solid| texture(solid).levels[0].texels[1][0] += 1e-6),
+        ("a coarser texel", |solid| texture(solid).levels[1].texels[0][0] += 1e-6),
         ("no texture", |solid| solid.texture = None),
     ];
 
@@ -321,7 +338,7 @@ pub(crate) mod tests {
         assert_eq!(original, print(&solid()));
         for (name, change) in SOLIDS {
             let mut changed = solid();
-            change(&mut changed.solids[0]);
+            change(&mut Arc::make_mut(&mut changed.solids)[0]);
             assert_ne!(original, print(&changed), "{name}");
         }
     }

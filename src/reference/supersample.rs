@@ -78,7 +78,7 @@ mod tests {
     fn a_pixel_is_the_mean_of_its_rays_through_the_full_volume() {
         let scene = scene();
         let mut full = scene.clone();
-        full.volume.levels.truncate(1);
+        std::sync::Arc::make_mut(&mut full.volume).levels.truncate(1);
         let single = Reference::new(&full, &full.view);
         let largest_difference = |scene: &Scene, shift: f64| {
             let image = supersampled(scene, 3);
@@ -110,9 +110,10 @@ mod tests {
         let scene = scene();
         let mut other = scene.clone();
         other.medium.lod_footprint = 5.0;
-        other.volume.levels.iter_mut().skip(1).for_each(|level| level.texels.fill([0.0; 4]));
+        let volume = std::sync::Arc::make_mut(&mut other.volume);
+        volume.levels.iter_mut().skip(1).for_each(|level| level.texels.fill([0.0; 4]));
         assert_eq!(supersampled(&scene, 2), supersampled(&other, 2));
-        other.volume.levels[0].texels[0][0] += 0.1;
+        std::sync::Arc::make_mut(&mut other.volume).levels[0].texels[0][0] += 0.1;
         assert_ne!(supersampled(&scene, 2), supersampled(&other, 2));
     }
 

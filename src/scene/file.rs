@@ -5,6 +5,7 @@
 //! [`SceneFile`] is what such a text says, read and checked key by key, before any file that it names is
 //! opened; [`load`](crate::scene::load()) makes a scene of it.
 
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use serde::Deserialize;
@@ -15,11 +16,12 @@ use super::Model;
 use super::PIXEL_FOOTPRINT;
 use super::camera::DEFAULT_FOV_DEGREES;
 use super::shading::DEFAULT_SHADOW_SIZE;
+use super::timeline::Ease;
 use crate::mesh::generate::Generator;
 use crate::mesh::projection::Projection;
 use crate::value::{
-    BelowOne, Colour, Exactly, FieldOfView, Finite, Fraction, NotNegative, PictureSize, Pixels, Positive,
-    Rounds, Samples, ShadowSize, Shininess, Step, Stops,
+    BelowOne, Colour, Exactly, FieldOfView, Finite, Fraction, Frames, NotNegative, PictureSize, Pixels,
+    Positive, Rate, Rounds, Samples, ShadowSize, Shininess, Step, Stops,
 };
 use crate::volume::{Filter, TransferFunction};
 
@@ -35,6 +37,11 @@ pub struct SceneFile {
     pub volume: Spanned<VolumeSection>,
     /// Where it is seen from; by default a camera that takes in the whole shell.
     pub camera: Option<CameraSection>,
+    /// Other places to see it from.
+    #[serde(default)]
+    pub cameras: BTreeMap<String, CameraSection>,
+    /// Which of them is taken in place of `camera`.
+    pub view: Option<Spanned<String>>,
     /// The picture.
     #[serde(default)]
     pub image: ImageSection,
@@ -51,6 +58,40 @@ pub struct SceneFile {
     /// Opaque meshes; the spans are those of the sections.
     #[serde(default)]
     pub solid: Vec<Spanned<SolidSection>>,
+    /// How long it lasts; by default one frame.
+    pub timeline: Option<TimelineSection>,
+    /// What changes in time; the spans are those of the sections.
+    #[serde(default)]
+    pub track: Vec<Spanned<TrackSection>>,
+}
+
+/// `[timeline]`: see [`Timeline`](super::Timeline).
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TimelineSection {
+    /// How many there are.
+    pub frames: Frames,
+    /// Frames a second.
+    #[serde(default = "default_rate")]
+    pub rate: Rate,
+    /// Whether the frame after the last would be the first.
+    #[serde(default, rename = "loop")]
+    pub loops: bool,
+}
+
+/// `[[track]]`: a key whose value changes in time.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TrackSection {
+    /// `section.key`, or `section.name.key` of what there may be several of.
+    pub key: Spanned<String>,
+    /// Seconds, ascending.
+    pub at: Spanned<Vec<Finite>>,
+    /// The key's value at each of these times.
+    pub values: Spanned<Vec<toml::Value>>,
+    /// How it goes from one to the next.
+    #[serde(default)]
+    pub ease: Ease,
 }
 
 /// `[base]`: the base mesh is opaque.
@@ -68,6 +109,8 @@ pub struct BaseSection {
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SolidSection {
+    /// What tracks and overrides call it.
+    pub name: Option<String>,
     /// An OBJ file, relative to the scene file.
     pub file: PathBuf,
     /// In place of the file's materials; multiplies the texture.
@@ -106,7 +149,10 @@ pub struct ShellSection {
     /// Repeats of the texture along u and v for each unit of the mesh's texture coordinates.
     #[serde(default = "scale_of_one")]
     pub uv_scale: Exactly<2, Finite>,
-    /// Added after the scale.
+    /// Turns the texture, after the scale.
+    #[serde(default = "zero")]
+    pub uv_rotation: Finite,
+    /// Added after the rotation.
     #[serde(default = "no_offset")]
     pub uv_offset: Exactly<2, Finite>,
 }
@@ -135,6 +181,15 @@ pub struct VolumeSection {
     pub filter: Filter,
     /// What fills the shell besides.
     pub haze: Option<HazeSection>,
+    /// Laid over the recipe's keys.
+    pub vary: Option<toml::Table>,
+}
+
+impl VolumeSection {
+    /// The same, with what the texels do not depend on as if nothing were said of it.
+    pub(super) fn texels(&self) -> Self {
+        Self { opacity_distance: None, lod_footprint: pixel_footprint(), ..self.clone() }
+    }
 }
 
 /// `[volume.haze]`: a medium that is everywhere.
@@ -168,6 +223,9 @@ pub struct CameraSection {
     pub target: Spanned<Exactly<3, Finite>>,
     /// World space, not along the line of sight; by default Y.
     pub up: Option<Spanned<Exactly<3, Finite>>>,
+    /// Degrees by which the eye is taken round the target, about `up`.
+    #[serde(default = "zero")]
+    pub orbit: Finite,
     /// The vertical field of view.
     #[serde(default = "default_fov")]
     pub fov: FieldOfView,
@@ -229,6 +287,8 @@ pub struct ShadingSection {
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct LightSection {
+    /// What tracks and overrides call it.
+    pub name: Option<String>,
     /// World space, not zero: where the light shines.
     pub direction: Option<Spanned<Exactly<3, Finite>>>,
     /// World space, not inside the camera.
@@ -286,6 +346,14 @@ impl Default for ShadingSection {
 
 fn white() -> Colour {
     Colour::linear(1.0, 1.0, 1.0)
+}
+
+fn default_rate() -> Rate {
+    Rate(24.0)
+}
+
+fn zero() -> Finite {
+    Finite(0.0)
 }
 
 fn origin() -> Exactly<3, Finite> {
@@ -372,8 +440,8 @@ recipe = "fog.toml"
                 found += 1;
             }
         }
-        assert_eq!(found, 4 + 9 + 5 + 3 + 3 + 10 + 2);
-        for (section, count) in [("light", 5), ("solid", 5)] {
+        assert_eq!(found, 5 + 10 + 6 + 3 + 3 + 10 + 2);
+        for (section, count) in [("light", 6), ("solid", 6)] {
             let text = Text::new("keys", format!("{SCENE}[[{section}]]\nunknown_key = 1"), &[]).unwrap();
             let message = text.parse::<SceneFile>(("mesh", "generator")).unwrap_err().to_string();
             let (_, documented) = DOCUMENTATION.split_once(&format!("\n## `[[{section}]]`")).unwrap();

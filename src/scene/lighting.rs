@@ -1,6 +1,7 @@
 //! From the sections `[shading]` and `[[light]]` of a scene file to [`Shading`].
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use glam::DVec3;
 use toml::Spanned;
@@ -60,7 +61,7 @@ impl<'a> Lighting<'a> {
             }
         };
         let lighting = Self { section, lights, stored };
-        let (factor, added) = lighting.shading(Directions { levels: Vec::new() }).bounds();
+        let (factor, added) = lighting.shading(Arc::new(Directions { levels: Vec::new() })).bounds();
         if factor.max(added) > BRIGHTEST {
             let message = format!(
                 "lights and factors together are {:.1e} times white, expected at most {BRIGHTEST:e}",
@@ -92,19 +93,25 @@ impl<'a> Lighting<'a> {
         Ok(())
     }
 
+    /// What the directions of a volume are made of.
+    pub fn origin(&self) -> (Model, Option<PathBuf>) {
+        (self.section.model, self.stored.clone())
+    }
+
     /// Reads or derives the volume's directions.
     ///
     /// # Errors
     /// As [`Directions::stored`].
-    pub fn shade(&self, volume: &Volume) -> Result<Shading> {
-        Ok(self.shading(match (&self.stored, self.section.model) {
-            (Some(path), _) => Directions::stored(path, volume)?,
-            (None, Model::Surface) => Directions::normals(volume),
-            (None, Model::Fibre) => Directions::tangents(volume),
-        }))
+    pub fn directions(&self, volume: &Volume) -> Result<Directions> {
+        match (&self.stored, self.section.model) {
+            (Some(path), _) => Directions::stored(path, volume),
+            (None, Model::Surface) => Ok(Directions::normals(volume)),
+            (None, Model::Fibre) => Ok(Directions::tangents(volume)),
+        }
     }
 
-    fn shading(&self, directions: Directions) -> Shading {
+    /// With the volume's directions.
+    pub fn shading(&self, directions: Arc<Directions>) -> Shading {
         let section = self.section;
         Shading {
             model: section.model,

@@ -2,20 +2,12 @@
 
 use std::path::Path;
 
-use glam::{DVec2, DVec3};
-
-use super::camera::DEFAULT_NEAR;
-use super::file::{CameraSection, HazeSection, Plan, SceneFile};
-use super::lighting::Lighting;
-use super::solids::Solids;
-use super::source::{MeshSource, VolumeSource};
+use super::file::SceneFile;
+use super::parts::{Checked, Parts};
 use super::text::Text;
-use super::{Camera, March, Medium, Scene, Sizes, View, backdrop, span, texel_edges};
-use crate::frame::{Backdrop, Stage, Stopwatch};
+use super::{Scene, Sizes};
+use crate::frame::{Backdrop, Stage};
 use crate::progress::{Progress, Silent};
-use crate::shell::{Shell, ShellOptions};
-use crate::value::{Exactly, Finite};
-use crate::volume::{Haze, Pyramid};
 use crate::{Error, Result, input};
 
 /// A scene, with what its file says beyond it.
@@ -49,13 +41,22 @@ pub fn load_if(
     progress: &dyn Progress,
     admit: &dyn Fn(&Sizes) -> Result<()>,
 ) -> Result<Loaded> {
+    build(&text(path, overrides)?, path.parent().unwrap_or(Path::new("")), progress, admit)
+}
+
+/// The text of a scene file.
+pub(super) fn text(path: &Path, overrides: &[String]) -> Result<Text> {
     let unreadable = |error: std::io::Error| {
         Error::input(path, format!("the scene file cannot be read: {error}"))
             .with_help("check the path, or write the scene that docs/scene.md describes")
     };
     let text = input::text(path).map_err(unreadable)?;
-    let text = Text::new(&path.display().to_string(), text, overrides)?;
-    build(&text, path.parent().unwrap_or(Path::new("")), progress, admit)
+    Text::new(&path.display().to_string(), text, overrides)
+}
+
+/// What a scene's text says.
+pub(super) fn read(text: &Text) -> Result<SceneFile> {
+    text.parse(("mesh", "generator"))
 }
 
 /// Loads a scene from a text: `name` is what errors call it, `base_dir` where its paths start.
@@ -72,123 +73,22 @@ fn build(
     progress: &dyn Progress,
     admit: &dyn Fn(&Sizes) -> Result<()>,
 ) -> Result<Loaded> {
-    let mut stopwatch = Stopwatch::start();
-    let file: SceneFile = text.parse(("mesh", "generator"))?;
-    // All that the text alone can have wrong is told before a long load.
-    let camera = file.camera.as_ref().map(|section| camera(text, section)).transpose()?;
-    let mesh = MeshSource::of(text, &file.mesh)?;
-    let volume = VolumeSource::of(text, &file.volume, base_dir)?;
-    let lighting = Lighting::of(text, &file, base_dir)?;
-    let solids = Solids::read(text, file.base.as_ref(), &file.solid, base_dir)?;
-    let backdrop = backdrop::read(&file.image, base_dir)?;
-    let [width, height] = file.image.size.0.map(|pixels| pixels.0);
-    let admit = |volume| admit(&Sizes { picture: [width, height], volume });
-    if let VolumeSource::Recipe(recipe) = &volume {
-        admit(recipe.header().size)?;
-    }
-
-    progress.stage("loading the mesh");
-    let mesh = mesh.load(base_dir)?;
-    stopwatch.lap("load.mesh");
-
-    progress.stage("building the shell");
-    let shell = &file.shell;
-    let options = ShellOptions {
-        thickness: shell.thickness.0,
-        thickness_scale: Vec::new(),
-        smoothing_rounds: shell.smoothing.0,
-        uv_scale: DVec2::from_array(shell.uv_scale.0.map(|x| x.0)),
-        uv_offset: DVec2::from_array(shell.uv_offset.0.map(|x| x.0)),
-    };
-    let shell = Shell::build(&mesh, &options)?;
-    let camera = camera.unwrap_or_else(|| Camera::framing(&shell.vertices));
-    if let Some(lighting) = &lighting {
-        lighting.check_camera(text, &camera)?;
-    }
-    stopwatch.lap("load.shell");
-
-    progress.stage("loading the volume");
-    let section = file.volume.get_ref();
-    // The path that a density of 1 makes one optical depth long.
-    let mean_free_path = section.density.as_ref().map(|density| density.extinction.0.recip());
-    let resolves = |size| {
-        span::check(&shell, size).map_err(|too_fine| {
-            let mesh = file.mesh.get_ref().file.as_ref().map(|file| base_dir.join(file));
-            let error = match (text.span_of("shell", "uv_scale"), mesh) {
-                (None, Some(mesh)) => Error::input(mesh, too_fine.to_string()),
-                (span, _) => text.error(span.unwrap_or(file.mesh.span()), too_fine.to_string()),
-            };
-            error.with_help(span::TooFine::HELP)
-        })
-    };
-    let mut volume = volume.load(&admit, &resolves)?;
-    let texel_along_w = options.thickness / f64::from(volume.size[2]);
-    let opacity_distance =
-        mean_free_path.or(section.opacity_distance.map(|distance| distance.0)).unwrap_or(texel_along_w);
-    if let Some(HazeSection { alpha, colour }) = &section.haze {
-        let depth = -(-alpha.0).ln_1p() * opacity_distance / options.thickness;
-        Haze { colour: colour.0, depth }.fill(&mut volume);
-    }
-    stopwatch.lap("load.volume");
-
-    let shading = lighting.map(|lighting| {
-        progress.stage("finding the volume's directions");
-        let shading = lighting.shade(&volume);
-        stopwatch.lap("load.directions");
-        shading
-    });
-    let shading = shading.transpose()?;
-
-    progress.stage("filtering the volume");
-    let texel = texel_edges(&shell, volume.size).map(|edge| edge / opacity_distance);
-    let volume = Pyramid::build_with(volume, section.filter, texel);
-    stopwatch.lap("load.pyramid");
-
-    let scene = Scene {
-        view: View { camera, width, height, depth: false },
-        medium: Medium { opacity_distance, lod_footprint: section.lod_footprint.0 },
-        march: match file.march.plan {
-            Plan::Default => March::Default { step: file.march.step.0 },
-            Plan::Paper => March::Paper { samples: file.march.samples.0 },
-            Plan::Exact => March::Exact,
-        },
-        shading,
-        solids: solids.build(&mesh),
-        shell,
-        volume,
-    };
-    Ok(Loaded { scene, backdrop, stages: stopwatch.finish() })
-}
-
-/// The camera, whose axes are checked to exist.
-fn camera(text: &Text, section: &CameraSection) -> Result<Camera> {
-    let vector = |v: &Exactly<3, Finite>| DVec3::from_array(v.0.map(|x| x.0));
-    let (eye, target) = (vector(&section.eye), vector(section.target.get_ref()));
-    let distance = eye.distance(target);
-    if !distance.is_normal() {
-        return Err(text.error(section.target.span(), "the target must be a point other than the eye"));
-    }
-    let up = section.up.as_ref().map_or(DVec3::Y, |up| vector(up.get_ref()));
-    // Below this sine rounding alone would decide which way is up.
-    let sine = (target - eye).normalize().cross(up.normalize_or_zero()).length();
-    if sine < 1e-9 {
-        return Err(text.error(
-            section.up.as_ref().unwrap_or(&section.target).span(),
-            "`up` must not be zero, nor point along the line of sight",
-        ));
-    }
-    let near = section.near.map_or(DEFAULT_NEAR * distance, |near| near.0);
-    Ok(Camera { eye, target, up, fov_y: section.fov.0.to_radians(), near })
+    let file = read(text)?;
+    let checked = Checked::new(text, &file, base_dir)?;
+    Parts::default().build(&checked, None, progress, admit)
 }
 
 #[cfg(test)]
 mod tests {
     use std::path::PathBuf;
 
+    use glam::DVec3;
+
     use super::*;
     use crate::scene::text::tests::assert_underlined;
-    use crate::scene::{Light, Model, Source};
-    use crate::volume::{self, AlphaMode, RawVolume, Sample, Volume};
+    use crate::scene::{Light, March, Model, Source};
+    use crate::shell::Shell;
+    use crate::volume::{self, AlphaMode, Pyramid, RawVolume, Sample, Volume};
 
     const SCENE: &str = r#"
 [mesh]
@@ -218,7 +118,7 @@ recipe = "fog.toml"
     #[test]
     fn what_is_left_out_has_its_default() {
         let Loaded { scene, backdrop, .. } = parse("scene.toml", SCENE, folder().path()).unwrap();
-        let expected = Scene::new(scene.shell.clone(), scene.volume.clone(), 0.1 / 4.0);
+        let expected = Scene::new(Shell::clone(&scene.shell), Pyramid::clone(&scene.volume), 0.1 / 4.0);
         assert_eq!((scene.view, scene.medium, scene.march), (expected.view, expected.medium, expected.march));
         assert_eq!(backdrop, Backdrop::default());
     }
@@ -382,7 +282,7 @@ recipe = "fog.toml"
         let folder = folder();
         let lit = format!("{SCENE}[shading]\n");
         let directions = |text: &str| {
-            parse("scene.toml", text, folder.path()).unwrap().scene.shading.unwrap().directions.levels
+            parse("scene.toml", text, folder.path()).unwrap().scene.shading.unwrap().directions.levels.clone()
         };
         let derived = directions(&lit);
         let unweighted = derived[0].texels.iter().flat_map(|[x, y, z, w]| [x / w, y / w, z / w]);

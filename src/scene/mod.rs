@@ -20,24 +20,32 @@
 mod backdrop;
 pub mod camera;
 pub mod file;
+mod files;
 mod lighting;
 pub mod load;
+mod parts;
+mod sequence;
 pub mod shading;
 pub mod shadow;
+mod sight;
 pub mod solid;
 mod solids;
 mod source;
 pub mod span;
 pub(crate) mod text;
+mod timeline;
 
 pub use backdrop::Background;
 pub use camera::{Camera, View};
 pub use load::{Loaded, load, load_if, parse};
+pub use sequence::{FrameInputs, Sequence};
 pub use shading::{Emission, Light, Model, Shading, Source};
 pub use shadow::LightView;
 pub use solid::Solid;
+pub use timeline::{Ease, Timeline};
 
 use std::fmt;
+use std::sync::Arc;
 
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
@@ -45,19 +53,20 @@ use serde::{Deserialize, Serialize};
 use crate::shell::Shell;
 use crate::volume::{Filter, Pyramid};
 
-/// A loaded scene: all that a method needs, whatever file it came from.
+/// A loaded scene: all that a method needs, whatever file it came from. Its large parts are shared: scenes that differ in
+/// little else, such as the frames of an animation, hold the same ones, and a method tells by the pointer what has changed.
 #[derive(Debug, Clone)]
 pub struct Scene {
     /// The geometry.
-    pub shell: Shell,
+    pub shell: Arc<Shell>,
     /// The texture that fills it.
-    pub volume: Pyramid,
+    pub volume: Arc<Pyramid>,
     /// How opacity and detail are to be read.
     pub medium: Medium,
     /// How light makes its colours; without it they are what it sends out.
     pub shading: Option<Shading>,
     /// Opaque surfaces beside the volume, or in its midst.
-    pub solids: Vec<Solid>,
+    pub solids: Arc<[Solid]>,
     /// Where it is seen from, how large, and whether depth is wanted.
     pub view: View,
     /// How finely the `shell` method marches.
@@ -167,11 +176,11 @@ impl Scene {
     pub fn new(shell: Shell, volume: Pyramid, opacity_distance: f64) -> Self {
         let camera = Camera::framing(&shell.vertices);
         Self {
-            shell,
-            volume,
+            shell: Arc::new(shell),
+            volume: Arc::new(volume),
             medium: Medium { opacity_distance, lod_footprint: PIXEL_FOOTPRINT },
             shading: None,
-            solids: Vec::new(),
+            solids: Arc::default(),
             view: View { camera, width: 512, height: 512, depth: false },
             march: March::default(),
         }

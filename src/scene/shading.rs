@@ -30,6 +30,8 @@
 //! - The glow is the paper's (section 5.3): colours select the voxels "where light is added in the integral".
 //! - A light casts shadows where [`Light::shadow`] says so: see [`shadow`](super::shadow).
 
+use std::sync::Arc;
+
 use glam::DVec3;
 use serde::Deserialize;
 
@@ -66,7 +68,7 @@ pub struct Shading {
     /// At most [`MOST_LIGHTS`].
     pub lights: Vec<Light>,
     /// Normals or tangents, one a texel of the scene's volume, with as many levels.
-    pub directions: Directions,
+    pub directions: Arc<Directions>,
 }
 
 /// What texels send out of themselves: `G` at the head of this module. Bright colours glow, others do not.

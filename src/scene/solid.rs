@@ -16,6 +16,8 @@
 //! triangle has two sides, alike: `n` is turned round where the eye is behind the triangle, and a light on the other side of the
 //! triangle than the eye, or in its plane, gives nothing.
 
+use std::sync::Arc;
+
 use glam::{DMat2, DVec2, DVec3};
 
 use crate::mesh::Mesh;
@@ -25,12 +27,12 @@ use crate::volume::Pyramid;
 #[derive(Debug, Clone, PartialEq)]
 pub struct Solid {
     /// World space.
-    pub mesh: Mesh,
+    pub mesh: Arc<Mesh>,
     /// Linear red, green, blue, each at least 0; multiplies the texture.
     pub colour: DVec3,
     /// What varies over the surface: levels of one texel along w, all of alpha 1; u runs to the right in the picture and v up,
     /// and both repeat. The reconstruction is that of volumes, in two dimensions.
-    pub texture: Option<Pyramid>,
+    pub texture: Option<Arc<Pyramid>>,
 }
 
 impl Solid {
@@ -79,9 +81,10 @@ mod tests {
     fn texels_are_densest_along_the_shorter_way() {
         let texels = vec![[1.0; 4]; 32];
         let texture = Pyramid::build(Volume::new([8, 4, 1], texels).unwrap());
-        let mut solid = Solid { mesh: Mesh::triangle(), colour: DVec3::ONE, texture: Some(texture) };
+        let texture = Some(Arc::new(texture));
+        let mut solid = Solid { mesh: Arc::new(Mesh::triangle()), colour: DVec3::ONE, texture };
         assert!((solid.texels_per_unit(0) - 8.0).abs() < 1e-12);
-        solid.mesh.positions[2] = 0.1 * DVec3::Y;
+        Arc::make_mut(&mut solid.mesh).positions[2] = 0.1 * DVec3::Y;
         assert!((solid.texels_per_unit(0) - 40.0).abs() < 1e-12);
         let [a, b, c] = solid.gradients(0);
         assert!(

@@ -1,6 +1,7 @@
 //! From the sections `[base]` and `[[solid]]` of a scene file to [`Solid`]s.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use glam::{DVec3, Vec3};
 use toml::Spanned;
@@ -15,7 +16,7 @@ use crate::{Error, Result};
 
 /// All that a scene file says of its opaque surfaces, with what can be read before the mesh of the shell is there.
 pub(super) struct Solids {
-    base: Option<Material>,
+    base: Option<(DVec3, Option<Arc<Pyramid>>)>,
     others: Vec<Solid>,
 }
 
@@ -37,6 +38,7 @@ impl Solids {
             Ok::<_, Error>(Material { colour: base.colour.0, texture: texture(&base.texture)? })
         };
         let base = base.map(material).transpose()?;
+        let base = base.map(|material| (material.colour.as_dvec3(), pyramid(&material)));
         let mut others = Vec::new();
         for section in sections {
             let span = section.span();
@@ -62,10 +64,19 @@ impl Solids {
         Ok(Self { base, others })
     }
 
+    /// Whether the base mesh is one.
+    pub(super) fn has_base(&self) -> bool {
+        self.base.is_some()
+    }
+
     /// All of them, the base first, where `mesh` is what the shell was built on.
-    pub(super) fn build(self, mesh: &Mesh) -> Vec<Solid> {
-        let base = self.base.map(|material| of_mesh(mesh.clone(), &material));
-        base.into_iter().chain(self.others).collect()
+    pub(super) fn build(&self, mesh: &Arc<Mesh>) -> Arc<[Solid]> {
+        let of_base = |(colour, texture): &(DVec3, Option<Arc<Pyramid>>)| Solid {
+            mesh: mesh.clone(),
+            colour: *colour,
+            texture: texture.clone(),
+        };
+        self.base.iter().map(of_base).chain(self.others.iter().cloned()).collect()
     }
 }
 
@@ -90,7 +101,7 @@ fn of_model(model: &Model) -> Result<Vec<Solid>> {
                 triangles: triangles.iter().map(|&triangle| model.triangles[triangle]).collect(),
                 uvs: triangles.iter().map(|&triangle| model.uvs[triangle]).collect(),
             };
-            of_mesh(mesh, material)
+            Solid { mesh: Arc::new(mesh), colour: material.colour.as_dvec3(), texture: pyramid(material) }
         })
     };
     let solids: Vec<Solid> = model.materials.iter().enumerate().filter_map(solid).collect();
@@ -101,9 +112,8 @@ fn of_model(model: &Model) -> Result<Vec<Solid>> {
     Ok(solids)
 }
 
-fn of_mesh(mesh: Mesh, material: &Material) -> Solid {
+fn pyramid(material: &Material) -> Option<Arc<Pyramid>> {
     // Opacities are all 1: their mean is what every filter makes of them, and this one is quick.
-    let pyramid = |texture: &Texture| Pyramid::build_with(texture.volume(), Filter::Paper, [1.0; 3]);
-    let texture = material.texture.as_ref().map(pyramid);
-    Solid { mesh, colour: material.colour.as_dvec3(), texture }
+    let of = |texture: &Texture| Arc::new(Pyramid::build_with(texture.volume(), Filter::Paper, [1.0; 3]));
+    material.texture.as_ref().map(of)
 }

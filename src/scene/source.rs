@@ -40,10 +40,10 @@ impl<'a> MeshSource<'a> {
         }
     }
 
-    pub(super) fn load(self, base_dir: &Path) -> Result<Mesh> {
+    pub(super) fn load(&self, base_dir: &Path) -> Result<Mesh> {
         match self {
             Self::Generator(generator) => generator.build(),
-            Self::File(file, projection) => obj::load(base_dir.join(file), projection),
+            Self::File(file, projection) => obj::load(base_dir.join(file), *projection),
         }
     }
 }
@@ -58,15 +58,17 @@ impl VolumeSource {
     pub(super) fn of(text: &Text, section: &Spanned<VolumeSection>, base_dir: &Path) -> Result<Self> {
         match section.get_ref() {
             VolumeSection {
-                recipe: Some(path), file: None, transfer: None, density: None, alpha: None, ..
+                recipe: Some(path), file: None, transfer: None, density: None, alpha: None, vary, ..
             } => {
-                Ok(Self::Recipe(recipe::load(base_dir.join(path))?))
+                let laid_over = |(key, value): (&String, &toml::Value)| format!("{key} = {value}");
+                let laid_over: Vec<String> = vary.iter().flatten().map(laid_over).collect();
+                Ok(Self::Recipe(recipe::load_with(base_dir.join(path), &laid_over)?))
             }
             VolumeSection { density: Some(_), opacity_distance: Some(_), .. } => Err(text.error(
                 section.span(),
                 "[volume.density] says itself how dense the volume is: leave out `opacity_distance`",
             )),
-            VolumeSection { recipe: None, file: Some(path), transfer, density, alpha, .. } => {
+            VolumeSection { recipe: None, file: Some(path), transfer, density, alpha, vary: None, .. } => {
                 let colour = |density: &DensitySection| {
                     density.colour.map_or([1.0; 3], |colour| colour.0.to_array())
                 };
@@ -80,14 +82,15 @@ impl VolumeSource {
             }
             _ => Err(text.error(
                 section.span(),
-                "[volume] needs either `recipe`, or `file` with what it may need of `transfer`, `density` and `alpha`",
+                "[volume] needs either `recipe`, with or without `vary`, or `file` with what it may need of `transfer`, `density` \
+                 and `alpha`",
             )),
         }
     }
 
     /// `admit` has been asked about a recipe's size; whether the shell `resolves` it has not.
     pub(super) fn load(
-        self,
+        &self,
         admit: &dyn Fn([u32; 3]) -> Result<()>,
         resolves: &dyn Fn([u32; 3]) -> Result<()>,
     ) -> Result<Volume> {
@@ -97,10 +100,10 @@ impl VolumeSource {
                 recipe.build()
             }
             Self::File(path, interpretation) => {
-                let raw = volume::read(&path)?;
+                let raw = volume::read(path)?;
                 admit(raw.size)?;
                 resolves(raw.size)?;
-                Volume::from_raw(raw, &interpretation)
+                Volume::from_raw(raw, interpretation)
             }
         }
     }

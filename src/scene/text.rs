@@ -18,15 +18,42 @@ use crate::{Error, Result};
 #[derive(Debug)]
 pub struct Text {
     source: Arc<NamedSource<String>>,
-    overrides: Vec<Override>,
+    layers: Vec<Layer>,
 }
 
-/// One `key=value`, as written and as TOML.
-#[derive(Debug)]
-struct Override {
-    written: String,
-    /// Padded to its place in the common address space.
-    padded: String,
+/// One `key=value` that is laid over the text.
+#[derive(Debug, Clone)]
+pub struct Layer {
+    /// What errors call it.
+    name: String,
+    help: Option<String>,
+    /// TOML, once it is in a text padded to its place in the common address space.
+    toml: String,
+}
+
+impl Layer {
+    /// A value, in TOML, of a dotted key; `name` is what errors call it.
+    ///
+    /// # Errors
+    /// What is wrong with the key, in a sentence.
+    pub fn new(name: String, key: &str, value: &str) -> std::result::Result<Self, String> {
+        let toml = format!("{key}={value}");
+        if key.contains(['\n', '#', '[', '=']) {
+            return Err(format!("`{key}` is not a dotted key"));
+        }
+        DeTable::parse(&toml).map_err(|error| error.message().to_owned())?;
+        Ok(Self { name, help: None, toml })
+    }
+
+    /// `dotted.key=value`, its value TOML or a bare word, which stands for a string.
+    fn of_override(written: &str) -> Result<Self> {
+        let help = Some("an override is written -D section.key=value".to_owned());
+        let toml = override_as_toml(written).map_err(|message| Error::Usage {
+            message: format!("-D {written}: {message}"),
+            help: help.clone(),
+        })?;
+        Ok(Self { name: format!("-D {written}"), help, toml })
+    }
 }
 
 impl Text {
@@ -36,15 +63,21 @@ impl Text {
     /// # Errors
     /// [`Error::Usage`] for an override that cannot be read.
     pub fn new(name: &str, text: String, overrides: &[String]) -> Result<Self> {
-        let mut end = text.len();
-        let overrides = overrides.iter().map(|written| {
-            let padding = " ".repeat(end + 1);
-            let padded = override_as_toml(&padding, written)?;
-            end = padded.len();
-            Ok(Override { written: written.clone(), padded })
-        });
-        let overrides = overrides.collect::<Result<_>>()?;
-        Ok(Self { source: Arc::new(NamedSource::new(name, text).with_language("toml")), overrides })
+        let source = Arc::new(NamedSource::new(name, text).with_language("toml"));
+        let layers = overrides.iter().map(|written| Layer::of_override(written)).collect::<Result<_>>()?;
+        Ok(Self { source, layers: Vec::new() }.with(layers))
+    }
+
+    /// The same with more laid over it.
+    pub fn with(&self, more: Vec<Layer>) -> Self {
+        let mut layers = self.layers.clone();
+        let mut end = layers.last().map_or(self.source.inner().len(), |layer| layer.toml.len());
+        layers.extend(more.into_iter().map(|layer| {
+            let toml = " ".repeat(end + 1) + &layer.toml;
+            end = toml.len();
+            Layer { toml, ..layer }
+        }));
+        Self { source: self.source.clone(), layers }
     }
 
     /// What text and overrides say together.
@@ -74,6 +107,16 @@ impl Text {
         T::deserialize(ValueDeserializer::from(root)).map_err(|error| self.blame(&error))
     }
 
+    /// What text and layers say together, without the sections named, as TOML that does not depend on how they are written.
+    ///
+    /// # Errors
+    /// As [`parse`](Self::parse).
+    pub fn plain(&self, without: &[&str]) -> Result<String> {
+        let mut table: toml::Table = self.read(self.tree()?)?;
+        table.retain(|section, _| !without.iter().any(|&one| one == section));
+        Ok(table.to_string())
+    }
+
     /// Where the value of a section's key is written, if it is.
     pub fn span_of(&self, section: &str, key: &str) -> Option<Range<usize>> {
         let root = self.tree().ok()?;
@@ -84,8 +127,8 @@ impl Text {
     fn tree(&self) -> Result<Spanned<DeTable<'_>>> {
         let parsed = |text| DeTable::parse(text).map_err(|error| self.blame(&error));
         let mut root = parsed(self.source.inner())?;
-        for layer in &self.overrides {
-            merge(root.get_mut(), parsed(&layer.padded)?.into_inner())
+        for layer in &self.layers {
+            merge(root.get_mut(), parsed(&layer.toml)?.into_inner())
                 .map_err(|(span, message)| self.error(span, message))?;
         }
         Ok(root)
@@ -97,12 +140,9 @@ impl Text {
         let message = message.into();
         let text = self.source.inner();
         if span.start > text.len() {
-            let layer = self.overrides.iter().find(|layer| span.start < layer.padded.len());
-            let written = layer.map_or("", |layer| &layer.written);
-            return Error::Usage {
-                message: format!("-D {written}: {message}"),
-                help: Some("an override is written -D section.key=value".to_owned()),
-            };
+            let layer = self.layers.iter().find(|layer| span.start < layer.toml.len());
+            let (name, help) = layer.map_or(("", None), |layer| (&layer.name, layer.help.clone()));
+            return Error::Usage { message: format!("{name}: {message}"), help };
         }
         // A section's span may run over many lines: its first is enough to find it.
         let end = span.end.min(text.len());
@@ -125,33 +165,24 @@ impl Text {
     }
 }
 
-/// The override as a TOML document behind `padding`.
-fn override_as_toml(padding: &str, written: &str) -> Result<String> {
-    let usage = |message: String| Error::Usage {
-        message: format!("-D {written}: {message}"),
-        help: Some("an override is written -D section.key=value".to_owned()),
-    };
-    let Some((key, value)) = written.split_once('=') else {
-        return Err(usage("there is no `=`".to_owned()));
-    };
+/// The override as a TOML document; else what is wrong with it.
+fn override_as_toml(written: &str) -> std::result::Result<String, String> {
+    let (key, value) = written.split_once('=').ok_or("there is no `=`")?;
     if key.contains(['\n', '#', '[']) {
-        return Err(usage("the key is not a dotted key".to_owned()));
+        return Err("the key is not a dotted key".to_owned());
     }
-    let as_toml = format!("{padding}{key}={value}");
-    let error = match DeTable::parse(&as_toml) {
-        Ok(_) => return Ok(as_toml),
-        Err(error) => error,
-    };
+    let Err(error) = DeTable::parse(written) else { return Ok(written.to_owned()) };
     // A bare word: `{:?}` escapes as TOML's basic strings do for all that may stand in a bare word.
     let bare = |c: char| c.is_alphanumeric() || "-_./+~@# ".contains(c);
-    let as_string = format!("{padding}{key}={value:?}");
+    let as_string = format!("{key}={value:?}");
     if !value.is_empty() && value.chars().all(bare) && DeTable::parse(&as_string).is_ok() {
         return Ok(as_string);
     }
-    Err(usage(error.message().to_owned()))
+    Err(error.message().to_owned())
 }
 
-/// Lays `over` on `under`, table into table; every other value replaces what was there.
+/// Lays `over` on `under`, table into table; every other value replaces what was there. In a list of tables the keys of a
+/// table are the names of those that it is laid on.
 fn merge<'a>(under: &mut DeTable<'a>, over: DeTable<'a>) -> Result<(), (Range<usize>, String)> {
     for (key, value) in over {
         let (name, span) = (key.get_ref().as_ref(), value.span());
@@ -159,6 +190,20 @@ fn merge<'a>(under: &mut DeTable<'a>, over: DeTable<'a>) -> Result<(), (Range<us
             (Some(DeValue::Table(below)), DeValue::Table(above)) => merge(below, above)?,
             (Some(DeValue::Table(_)), _) => {
                 return Err((span, format!("`{name}` is a section, not a value")));
+            }
+            (Some(DeValue::Array(below)), DeValue::Table(above)) if below.iter().any(is_table) => {
+                for (named, value) in above {
+                    let Some(below) = below.iter_mut().find_map(|table| table_named(table, named.get_ref()))
+                    else {
+                        let message = format!("no [[{name}]] has the name \"{}\"", named.get_ref());
+                        return Err((named.span(), message));
+                    };
+                    let span = value.span();
+                    let DeValue::Table(above) = value.into_inner() else {
+                        return Err((span, format!("`{}` is a section, not a value", named.get_ref())));
+                    };
+                    merge(below, above)?;
+                }
             }
             (Some(_), DeValue::Table(_)) => {
                 return Err((span, format!("`{name}` is a value, not a section")));
@@ -170,6 +215,18 @@ fn merge<'a>(under: &mut DeTable<'a>, over: DeTable<'a>) -> Result<(), (Range<us
         }
     }
     Ok(())
+}
+
+fn is_table(value: &Spanned<DeValue<'_>>) -> bool {
+    matches!(value.get_ref(), DeValue::Table(_))
+}
+
+/// The table, where that is its `name`.
+fn table_named<'a, 'b>(value: &'b mut Spanned<DeValue<'a>>, wanted: &str) -> Option<&'b mut DeTable<'a>> {
+    let DeValue::Table(table) = value.get_mut() else { return None };
+    let is_it =
+        matches!(table.get("name").map(Spanned::get_ref), Some(DeValue::String(name)) if name == wanted);
+    is_it.then_some(table)
 }
 
 /// Turns `[section] tag = "variant", field = 1` into `[section] tag = { variant = { field = 1 } }`, which is how

@@ -23,7 +23,7 @@ impl Shell {
         validate(mesh, options)?;
         let mut shell = Self {
             topology: Arc::new(Topology::of(mesh)?),
-            vertices: Vec::new(),
+            vertices: Arc::default(),
             texture: Vec::new(),
             cells: Vec::new(),
             health: Health::default(),
@@ -32,8 +32,21 @@ impl Shell {
         Ok(shell)
     }
 
+    /// A shell for the same triangles with other positions, normals, UVs or options, which shares the topology with this one, and
+    /// the vertices where none has moved. `spare`, a shell that is no longer needed, may lend its memory.
+    ///
+    /// # Errors
+    /// As [`Shell::rebuild`].
+    pub fn moved(&self, mesh: &Mesh, options: &ShellOptions, spare: Option<Self>) -> Result<Self> {
+        let (texture, cells) = spare.map_or_else(Default::default, |spare| (spare.texture, spare.cells));
+        let (topology, vertices) = (self.topology.clone(), self.vertices.clone());
+        let mut moved = Self { topology, vertices, texture, cells, health: Health::default() };
+        moved.rebuild(mesh, options)?;
+        Ok(moved)
+    }
+
     /// Builds the shell again for the same triangles with other positions, normals, UVs or options, and
-    /// keeps its topology. On an error the shell is as before.
+    /// keeps its topology, and its vertices where none has moved. On an error the shell is as before.
     ///
     /// # Errors
     /// As [`Shell::build`], and [`Error::Usage`] where the number of positions or the triangles differ from
@@ -57,19 +70,22 @@ impl Shell {
     fn place(&mut self, mesh: &Mesh, options: &ShellOptions) {
         let directions = extrude::directions(mesh, options);
         let outer = mesh.positions.iter().zip(&directions).enumerate();
-        self.vertices.clear();
-        self.vertices.extend(&mesh.positions);
-        self.vertices.extend(outer.map(|(id, (&x, &n))| x + extrude::thickness_at(options, id) * n));
+        let outer = outer.map(|(id, (&x, &n))| x + extrude::thickness_at(options, id) * n);
+        let vertices: Vec<DVec3> = mesh.positions.iter().copied().chain(outer).collect();
+        if vertices != *self.vertices {
+            self.vertices = Arc::new(vertices);
+        }
 
         let topology = &*self.topology;
-        let vertices = &self.vertices;
+        let vertices = &*self.vertices;
+        let texture_map = options.texture_map();
         let tetrahedra = topology.tetrahedra.par_iter().with_min_len(TASK);
         tetrahedra
             .clone()
             .zip(&topology.corners)
             .enumerate()
             .map(|(t, (ids, corners))| {
-                let uvs = mesh.uvs[t / 3].map(|uv| options.texture_uv(uv));
+                let uvs = mesh.uvs[t / 3].map(&texture_map);
                 texture_coordinates(uvs, ids.map(|id| id >= topology.base_vertices), *corners)
             })
             .collect_into_vec(&mut self.texture);
@@ -91,15 +107,18 @@ impl Shell {
 }
 
 impl ShellOptions {
-    fn texture_uv(&self, uv: DVec2) -> DVec2 {
+    /// From the mesh's texture coordinates to the texture's.
+    fn texture_map(&self) -> impl Fn(DVec2) -> DVec2 + Sync + use<> {
         // Whole turns of the offset change nothing, but would take digits from what is added.
-        self.uv_scale * uv + (self.uv_offset - self.uv_offset.floor())
+        let offset = self.uv_offset - self.uv_offset.floor();
+        let (scale, rotation) = (self.uv_scale, DVec2::from_angle(self.uv_rotation));
+        move |uv| rotation.rotate(scale * uv) + offset
     }
 }
 
 impl Topology {
     /// Whether the mesh has the triangles that this was built from, corner by corner.
-    fn is_of(&self, mesh: &Mesh) -> bool {
+    pub fn is_of(&self, mesh: &Mesh) -> bool {
         let split_from = |ids: &[u32; 4], corners: &[u8; 4], triangle: &[u32; 3]| {
             ids.iter().zip(corners).all(|(id, &corner)| id % self.base_vertices == triangle[corner as usize])
         };
@@ -137,7 +156,10 @@ fn validate(mesh: &Mesh, options: &ShellOptions) -> Result<()> {
         let message = format!("shell.thickness_scale[{id}] is {}", options.thickness_scale[id]);
         return usage(message, "give a finite factor that is not negative");
     }
-    for (key, value) in [("uv_scale", options.uv_scale), ("uv_offset", options.uv_offset)] {
+    let rotation = DVec2::splat(options.uv_rotation);
+    for (key, value) in
+        [("uv_scale", options.uv_scale), ("uv_rotation", rotation), ("uv_offset", options.uv_offset)]
+    {
         if !value.is_finite() {
             return usage(format!("shell.{key} is {value}"), "give two finite numbers");
         }
@@ -156,7 +178,8 @@ fn validate(mesh: &Mesh, options: &ShellOptions) -> Result<()> {
             return usage(format!("mesh {what} {id} is {}", list[id]), "repair the mesh or its deformation");
         }
     }
-    let unmapped = |corners: &[DVec2; 3]| corners.iter().any(|&uv| !options.texture_uv(uv).is_finite());
+    let texture_map = options.texture_map();
+    let unmapped = |corners: &[DVec2; 3]| corners.iter().any(|&uv| !texture_map(uv).is_finite());
     if let Some(index) = mesh.uvs.iter().position(unmapped) {
         let message =
             format!("the UVs of mesh triangle {index} are not finite once shell.uv_scale is applied");

@@ -78,8 +78,10 @@ pub struct ShellOptions {
     pub thickness_scale: Vec<f64>,
     /// Rounds of neighbourhood averaging applied to the extrusion directions.
     pub smoothing_rounds: u32,
-    /// Texture coordinates are `uv_scale * uv + uv_offset`, modulo 1.
+    /// Texture coordinates are `R (uv_scale * uv) + uv_offset`, modulo 1; R turns by `uv_rotation`.
     pub uv_scale: DVec2,
+    /// Radians, from u towards v: see `uv_scale`.
+    pub uv_rotation: f64,
     /// See `uv_scale`.
     pub uv_offset: DVec2,
 }
@@ -114,7 +116,7 @@ pub struct Shell {
     /// Shared between the frames of a deforming mesh.
     pub topology: Arc<Topology>,
     /// World space: base vertices, then outer vertices.
-    pub vertices: Vec<DVec3>,
+    pub vertices: Arc<Vec<DVec3>>,
     /// Texture-space (u, v, w) of the four vertices of each tetrahedron; w is exactly 0 or 1.
     ///
     /// u and v repeat, so the largest whole numbers that leave none of the four negative are taken off
@@ -137,6 +139,7 @@ impl ShellOptions {
             thickness_scale: Vec::new(),
             smoothing_rounds: 0,
             uv_scale: DVec2::ONE,
+            uv_rotation: 0.0,
             uv_offset: DVec2::ZERO,
         }
     }

@@ -89,11 +89,11 @@ fn in_waves(mesh: &Mesh, scale: f64, view: View) -> Result<Arc<Scene>> {
     let shell = Shell::build(mesh, &options)?;
     let medium = Medium { opacity_distance: 0.2 * scale, lod_footprint: 1.0 };
     Ok(Arc::new(Scene {
-        shell,
-        volume: waves(),
+        shell: Arc::new(shell),
+        volume: Arc::new(waves()),
         medium,
         shading: None,
-        solids: Vec::new(),
+        solids: Arc::default(),
         view,
         march: March::default(),
     }))

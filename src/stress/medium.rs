@@ -12,6 +12,7 @@ use crate::mesh::generate::{Generator, Plane, Torus};
 use crate::reference::Reference;
 use crate::scene::{March, Medium, Scene, View};
 use crate::shell::{Shell, ShellOptions};
+use crate::volume::Pyramid;
 use crate::{Error, Result};
 
 pub(super) const CASES: &[Case] = &[
@@ -151,7 +152,7 @@ fn thin_path(stand: &Stand<'_>) -> Result<f64> {
         let mut volume = columns(&[([0.5; 3], 1e-8)]).levels.remove(0);
         volume.texels = vec![volume.texels[0]; texels];
         volume.size = [1, 1, texels as u32];
-        scene.volume = crate::volume::Pyramid::build(volume);
+        scene.volume = Arc::new(Pyramid::build(volume));
         // 16 samples a texel: 65,536 of them.
         scene.march = March::Default { step: 1.0 / 16.0 };
         worst = worst.max(relative_error(stand, scene)?);

@@ -31,11 +31,11 @@ pub fn constant_scene(mesh: &Mesh, thickness: f64, alpha: f32, colour: f32, view
 pub fn painted(shell: Shell, paints: &[Paint], opacity_distance: f64, view: View) -> Scene {
     let medium = Medium { opacity_distance, lod_footprint: 0.0 };
     Scene {
-        shell,
-        volume: columns(paints),
+        shell: Arc::new(shell),
+        volume: Arc::new(columns(paints)),
         medium,
         shading: None,
-        solids: Vec::new(),
+        solids: Arc::default(),
         view,
         march: March::default(),
     }
@@ -77,7 +77,7 @@ pub fn connected(vertices: Vec<DVec3>, tetrahedra: Vec<[u32; 4]>, texture: &[DVe
     Shell {
         health: Health { tetrahedra: corners.len() as u64, ..Health::default() },
         topology: Arc::new(topology),
-        vertices,
+        vertices: Arc::new(vertices),
         texture: texture.iter().map(|point| [*point; 4]).collect(),
         cells: corners.iter().map(cell).collect(),
     }

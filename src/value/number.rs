@@ -105,6 +105,14 @@ number! {
     /// An angle in degrees, above 0 and below 180.
     FieldOfView = "an angle in degrees between 0 and 180, both excluded", |value| value > 0.0 && value < 180.0
 }
+number! {
+    /// Frames a second.
+    Rate = "a number of frames a second from 0.001 to 1000", |value| (0.001..=1000.0).contains(&value)
+}
+count! {
+    /// The number of frames of an animation.
+    Frames = 1..=100000
+}
 count! {
     /// The width or height of a picture, in pixels.
     Pixels = 1..=32768

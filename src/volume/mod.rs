@@ -12,7 +12,7 @@ mod pyramid;
 mod raw;
 pub mod recipe;
 mod sample;
-mod stack;
+pub(crate) mod stack;
 mod strip;
 mod transfer;
 pub mod voxelize;

@@ -24,15 +24,7 @@ pub(super) fn is_pattern(path: &Path) -> bool {
 /// Reads the images in a folder (`*.png`), those of a pattern, or one image, in the natural order of their
 /// names: `slice_2.png` is before `slice_10.png`.
 pub(super) fn read(path: &Path) -> Result<RawVolume> {
-    let images = if path.is_dir() {
-        matching(path, path, "*.png")?
-    } else if is_pattern(path) {
-        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        matching(path, folder, &path.file_name().unwrap_or_default().to_string_lossy())?
-    } else {
-        vec![path.into()]
-    };
-
+    let images = images(path)?;
     let mut values = Vec::new();
     let shape = shape(&decoder(&images[0])?);
     let ((width, height), colour) = shape;
@@ -55,6 +47,21 @@ pub(super) fn read(path: &Path) -> Result<RawVolume> {
     let format = format!("PNG {colour:?}");
     let alpha_mode = AlphaMode::Straight;
     RawVolume { path: path.into(), format, size, channels, values, full_scale: 1.0, alpha_mode }.validated()
+}
+
+/// The images that `path` stands for, in order.
+///
+/// # Errors
+/// [`Error::Input`] where a folder cannot be read, or has none that match.
+pub(crate) fn images(path: &Path) -> Result<Vec<PathBuf>> {
+    if path.is_dir() {
+        matching(path, path, "*.png")
+    } else if is_pattern(path) {
+        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        matching(path, folder, &path.file_name().unwrap_or_default().to_string_lossy())
+    } else {
+        Ok(vec![path.into()])
+    }
 }
 
 /// The width and height of an image, and what its pixels are.

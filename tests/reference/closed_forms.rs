@@ -305,7 +305,7 @@ fn cells_without_volume_add_nothing() {
     options.thickness_scale.fill(0.0);
     let flat = Shell::build(&mesh, &options).unwrap();
     assert_eq!(flat.health.zero_volume, flat.health.tetrahedra);
-    let flat = Scene { shell: flat, ..scene.clone() };
+    let flat = Scene { shell: flat.into(), ..scene.clone() };
     assert_eq!(Reference::new(&flat, &view).pixel(6, 6).rgba, [0.0; 4]);
 }
 
@@ -330,7 +330,7 @@ fn media_that_overlap_add() {
         assert_close(reference.integrate_ray(point).rgba[3], total, TOLERANCE + f64::from(f32::EPSILON));
     }
     // Walls hide across media: the upper shell is opaque from its upper texel down, and comes first.
-    scene.volume = level_zero(layers(&[grey(0.4), grey(1.0)]));
+    scene.volume = level_zero(layers(&[grey(0.4), grey(1.0)])).into();
     let reference = Reference::new(&scene, &view);
     assert_eq!(reference.pixel(4, 4).rgba, [1.0, 0.5, 0.0, 1.0]);
 }

@@ -20,7 +20,7 @@ fn tolerances_are_kept_on_noise_with_opaque_texels() {
     let view = view(DVec3::new(0.5, 2.0, 2.2), DVec3::new(0.4, 0.0, 0.3), 24);
     let mut scene = scene(torus_shell(), Pyramid::build(noise([9, 7, 5], 1.0)), view);
     for (footprint, gain) in [(0.0, 1.0), (1.0, 1.0), (0.5, 50.0)] {
-        scene.volume = Pyramid::build(bright_noise([9, 7, 5], 1.0, gain));
+        scene.volume = Pyramid::build(bright_noise([9, 7, 5], 1.0, gain)).into();
         scene.medium.lod_footprint = footprint;
         let at = |tolerance| {
             let reference = Reference::new(&scene, &view).with_tolerance(tolerance);

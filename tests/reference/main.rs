@@ -75,11 +75,11 @@ fn slanted_view() -> View {
 fn scene(shell: Shell, volume: Pyramid, view: View) -> Scene {
     let medium = Medium { opacity_distance: OPACITY_DISTANCE, lod_footprint: 0.0 };
     Scene {
-        shell,
-        volume,
+        shell: shell.into(),
+        volume: volume.into(),
         medium,
         shading: None,
-        solids: Vec::new(),
+        solids: [].into(),
         view,
         march: March::Default { step: 1.0 },
     }
@@ -101,7 +101,7 @@ fn lit(scene: &Scene, lights: Vec<Light>) -> Shading {
         emission: Emission { glow: 0.0, from: 0.0 },
         shadow_size: 64,
         lights,
-        directions: Directions::of(&scene.volume.levels[0], |_| DVec3::ZERO),
+        directions: Directions::of(&scene.volume.levels[0], |_| DVec3::ZERO).into(),
     }
 }
 

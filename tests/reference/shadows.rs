@@ -202,7 +202,7 @@ fn plate_and_floor(left: f64) -> Vec<Solid> {
     let mut floor = Generator::Plane(Plane { size: 10.0, segments: 2 }).build().unwrap();
     floor.positions.iter_mut().for_each(|position| position.y = FLOOR);
     [(plate, DVec3::ONE), (floor, DVec3::splat(0.5))]
-        .map(|(mesh, colour)| Solid { mesh, colour, texture: None })
+        .map(|(mesh, colour)| Solid { mesh: mesh.into(), colour, texture: None })
         .to_vec()
 }
 
@@ -215,7 +215,7 @@ fn the_shadow_of_a_plate_lies_in_the_fog_and_on_the_floor() {
     let view = view(DVec3::new(0.3, 1.1, 0.9), DVec3::new(-0.4, 0.0, 0.3), 24);
     let eye = view.camera.eye;
     let mut scene = fog(sun(), view, Quantity::Opacity);
-    scene.solids = plate_and_floor(-0.5);
+    scene.solids = plate_and_floor(-0.5).into();
     // Where a ray is in the shadow: the plate is the box |x - middle| < half, on the way along the sun to its height.
     let shaded = |left: f64, direction: DVec3| {
         let up = |point: DVec3, slope: f64| point + SUN * ((PLATE * slope - point.y) / SUN.y);
@@ -275,9 +275,9 @@ fn a_ray_that_comes_from_the_light_is_lit_unless_a_solid_is_behind_the_eye() {
     assert!(error(&middle(&scene), &expected) <= SHADOW_TOLERANCE);
     // Along the sun from the target, the plate's height is over its middle.
     let towards = target + SUN * (PLATE / SUN.y);
-    scene.solids = plate_and_floor(towards.x - 0.4);
+    scene.solids = plate_and_floor(towards.x - 0.4).into();
     assert_eq!(middle(&scene), [0.0, 0.0, 0.0, 1.0]);
-    scene.solids.remove(0);
+    scene.solids = scene.solids[1..].into();
     let floor = 0.5 * SUN.y * passed * passed;
     let [r, g, b] = [1.0, 2.0, 4.0].map(|light| light * (bright + floor));
     assert!(error(&middle(&scene), &[r, g, b, 1.0]) <= SHADOW_TOLERANCE);
@@ -329,7 +329,7 @@ fn a_ball_does_not_shade_its_lit_side() {
     let view = view(DVec3::new(0.4, 1.9, 2.9), DVec3::ZERO, 24);
     let mut scene = scene(flat_shell(), level_zero(layers(&[grey(0.0)])), view);
     let mesh = Generator::Sphere(Sphere { segments: 24, rings: 16, ..Sphere::default() }).build().unwrap();
-    scene.solids = vec![Solid { mesh, colour: DVec3::ONE, texture: None }];
+    scene.solids = [Solid { mesh: mesh.into(), colour: DVec3::ONE, texture: None }].into();
     scene.shading = Some(lit(&scene, vec![sun()]));
     let mut bright = scene.clone();
     bright.shading.as_mut().unwrap().lights[0].shadow = false;
@@ -357,7 +357,7 @@ fn the_tolerance_is_kept() {
     for (most, footprint) in [(0.9, 1.0), (1.0, 0.0)] {
         let mut scene = scene(torus_shell(), Pyramid::build(noise([9, 7, 5], most)), view);
         scene.medium.lod_footprint = footprint;
-        scene.solids = vec![Solid { mesh: ball.clone(), colour: DVec3::splat(0.7), texture: None }];
+        scene.solids = [Solid { mesh: ball.clone().into(), colour: DVec3::splat(0.7), texture: None }].into();
         scene.shading = Some(lit(&scene, sources.map(|source| light(source, DVec3::ONE)).to_vec()));
         let at = |scene: &Scene, tolerance| {
             let reference = Reference::new(scene, &view).with_tolerance(tolerance);

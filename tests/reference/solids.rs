@@ -1,5 +1,7 @@
 //! Solids: which the ray meets, what they hide, and what colour they have.
 
+use std::sync::Arc;
+
 use glam::{DMat3, DQuat, DVec2, DVec3};
 use mesoshell::mesh::Mesh;
 use mesoshell::mesh::generate::{Generator, Plane, Sphere};
@@ -22,7 +24,7 @@ fn solid(generator: Generator, colour: DVec3, linear: DMat3, offset: DVec3) -> S
     mesh.positions.iter_mut().for_each(|position| *position = linear * *position + offset);
     let map = linear.inverse().transpose();
     mesh.normals.iter_mut().for_each(|normal| *normal = (map * *normal).normalize());
-    Solid { mesh, colour, texture: None }
+    Solid { mesh: mesh.into(), colour, texture: None }
 }
 
 /// Depth, number and barycentric coordinates of the first triangle, by trying all: T. Moeller, B. Trumbore, 1997.
@@ -47,7 +49,7 @@ fn a_ball_half_sunk_in_fog() {
     let ball = Generator::Sphere(Sphere { radius: 0.4, segments: 14, rings: 9 });
     let mut scene = scene(flat_shell(), level_zero(layers(&[grey(alpha)])), view);
     let centre = DVec3::new(0.05, THICKNESS, 0.02);
-    scene.solids = vec![solid(ball, colour, DMat3::IDENTITY, centre)];
+    scene.solids = [solid(ball, colour, DMat3::IDENTITY, centre)].into();
     let sigma = -(1.0 - f64::from(alpha)).ln() / OPACITY_DISTANCE;
     let worst = |scene: &Scene, mesh: &Mesh| {
         let reference = Reference::new(scene, &view);
@@ -74,7 +76,7 @@ fn a_ball_half_sunk_in_fog() {
         worst
     };
     assert!(worst(&scene, &scene.solids[0].mesh) <= TOLERANCE + ROUNDING);
-    let mut moved = scene.solids[0].mesh.clone();
+    let mut moved = Mesh::clone(&scene.solids[0].mesh);
     moved.positions.iter_mut().for_each(|position| position.y += 1e-6);
     assert!(worst(&scene, &moved) > 100.0 * TOLERANCE);
 }
@@ -97,7 +99,7 @@ fn no_ray_passes_between_the_triangles_of_a_closed_mesh() {
                     let mut view = view(eye, target, 1);
                     view.camera.up = DVec3::new(0.3, 0.8, 0.4);
                     let mut scene = scene(flat_shell(), level_zero(layers(&[grey(0.0)])), view);
-                    scene.solids = vec![Solid { mesh: mesh.clone(), ..solid.clone() }];
+                    scene.solids = [Solid { mesh: mesh.clone().into(), ..solid.clone() }].into();
                     misses += u32::from(Reference::new(&scene, &view).pixel(0, 0).rgba != [1.0; 4]);
                 }
             }
@@ -106,8 +108,9 @@ fn no_ray_passes_between_the_triangles_of_a_closed_mesh() {
     };
     assert_eq!(misses(&ball), 0);
     let mut torn = ball.clone();
-    torn.mesh.triangles.remove(20);
-    torn.mesh.uvs.remove(20);
+    let mesh = Arc::make_mut(&mut torn.mesh);
+    mesh.triangles.remove(20);
+    mesh.uvs.remove(20);
     assert!(misses(&torn) >= 2);
 }
 
@@ -124,14 +127,15 @@ fn a_texture_on_a_turned_and_stretched_solid_blends_its_levels() {
     let mut plate = solid(Generator::Plane(Plane { size: 2.0, segments: 2 }), colour, linear, offset);
     // As the plane's own map says, then turned and three times over, so that both repeat.
     let uv = |p: DVec3| DVec2::new(p.x + 0.4 * p.z, 1.5 * p.z - 0.1);
-    for (triangle, uvs) in plate.mesh.triangles.iter().zip(&mut plate.mesh.uvs) {
-        *uvs = triangle.map(|id| uv(linear.inverse() * (plate.mesh.positions[id as usize] - offset)));
+    let mesh = Arc::make_mut(&mut plate.mesh);
+    for (triangle, uvs) in mesh.triangles.iter().zip(&mut mesh.uvs) {
+        *uvs = triangle.map(|id| uv(linear.inverse() * (mesh.positions[id as usize] - offset)));
     }
-    plate.texture = Some(texture.clone());
+    plate.texture = Some(texture.clone().into());
     let eye = offset + linear * DVec3::new(0.2, 2.0, 0.9);
     let view = view(eye, offset, 9);
     let mut scene = scene(flat_shell(), level_zero(layers(&[grey(0.0)])), view);
-    scene.solids = vec![plate];
+    scene.solids = [plate].into();
     // The densest texels of all directions in the plane.
     let texels_along = |x: f64, z: f64| {
         let along = DVec3::new(x, 0.0, z);
@@ -203,7 +207,7 @@ fn a_plate_is_lit_on_the_side_that_is_seen() {
             let seen: View = view(eye, DVec3::ZERO, 5);
             let mut scene = scene(flat_shell(), level_zero(layers(&[grey(0.0)])), seen);
             let plate = Generator::Plane(Plane { size: 8.0, segments: 3 });
-            scene.solids = vec![solid(plate, DVec3::new(0.5, 0.8, 0.3), DMat3::IDENTITY, DVec3::ZERO)];
+            scene.solids = [solid(plate, DVec3::new(0.5, 0.8, 0.3), DMat3::IDENTITY, DVec3::ZERO)].into();
             let lights = [light(sun, DVec3::new(1.0, 0.5, 2.0)), light(lamp, DVec3::new(0.3, 2.0, 1.0))];
             let lights = lights.map(|light| Light { shadow, ..light }).to_vec();
             let mut shading = lit(&scene, lights);

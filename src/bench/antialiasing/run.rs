@@ -124,7 +124,7 @@ impl Bench<'_> {
             let part = index as f64 / self.sweep.filters.len() as f64;
             self.tell(REFERENCES_PART + (1.0 - REFERENCES_PART) * part);
             self.setup.progress.stage(&format!("{name}: {}", filter.name()));
-            scene.volume = scene.filtered(filter);
+            scene.volume = Arc::new(scene.filtered(filter));
             let silent: Arc<dyn Progress> = Arc::new(Silent);
             let setup = Setup { progress: &silent, ..*self.setup };
             let mut method = METHODS[0].prepare(Arc::new(scene.clone()), &setup)?;

@@ -307,7 +307,7 @@ impl Shadows {
         let Some(target) = &self.blockers else { return Ok(()) };
         let mut blockers: Vec<Blocker> = Vec::new();
         for (index, view) in (0..).zip(&self.views) {
-            for solid in &scene.solids {
+            for solid in scene.solids.iter() {
                 let of_triangle = |t: usize| blocker(view, solid.corners(t), index);
                 blockers.extend((0..solid.mesh.triangles.len()).filter_map(of_triangle));
             }
@@ -396,7 +396,7 @@ impl<'a> Lens<'a> {
 
     /// A tetrahedron, where it is, and whether more than level 0 can be needed in it; `None` where none of it is seen.
     fn cell(&self, scene: &Scene, t: usize) -> Option<(Cell, Bounds, bool)> {
-        let Shell { cells, vertices, texture, .. } = &scene.shell;
+        let Shell { cells, vertices, texture, .. } = &*scene.shell;
         if !cells[t].has_maps() {
             return None;
         }

@@ -1,0 +1,289 @@
+//! What a scene's sections are made into, and kept for the next scene as long as they stay what they are: the frames of an
+//! animation share all that does not move.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use glam::DVec2;
+use toml::Spanned;
+
+use super::file::{
+    BaseSection, HazeSection, ImageSection, MeshSection, Plan, SceneFile, SolidSection, VolumeSection,
+};
+use super::lighting::Lighting;
+use super::load::Loaded;
+use super::solids::Solids;
+use super::source::{MeshSource, VolumeSource};
+use super::text::Text;
+use super::{Camera, March, Medium, Model, Scene, Sizes, Solid, View, backdrop, sight, span, texel_edges};
+use crate::frame::{Backdrop, Stopwatch};
+use crate::mesh::Mesh;
+use crate::progress::Progress;
+use crate::shell::{Shell, ShellOptions};
+use crate::volume::{Directions, Haze, Pyramid};
+use crate::{Error, Result};
+
+/// What was made last, and of what.
+struct Kept<Of, Made>(Option<(Of, Made)>);
+
+impl<Of, Made> Default for Kept<Of, Made> {
+    fn default() -> Self {
+        Self(None)
+    }
+}
+
+impl<Of: PartialEq, Made: Clone> Kept<Of, Made> {
+    /// What was made of the same; else what `make` makes of it, which is then kept in its place.
+    fn get(&mut self, of: Of, make: impl FnOnce(&Of) -> Result<Made>) -> Result<Made> {
+        if let Some((made_of, made)) = &self.0
+            && *made_of == of
+        {
+            return Ok(made.clone());
+        }
+        let made = make(&of)?;
+        self.0 = Some((of, made.clone()));
+        Ok(made)
+    }
+}
+
+/// Equal where it is the very same.
+#[derive(Clone)]
+struct Same<T>(Arc<T>);
+
+impl<T> PartialEq for Same<T> {
+    fn eq(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.0, &other.0)
+    }
+}
+
+/// All that a volume's texels depend on.
+#[derive(PartialEq)]
+struct Texels {
+    /// Without the keys that are not among it.
+    section: VolumeSection,
+    /// The opacity distance as [`Checked::opacity_distance`] tells it and the shell's thickness, where there is haze.
+    haze: Option<(Option<f64>, f64)>,
+    /// The shell whose texels are filtered, and its opacity distance.
+    rest: (Same<Shell>, Option<f64>),
+}
+
+/// A shell at rest: coarser levels of the volume are made for its texels, however it is deformed.
+#[derive(Clone)]
+pub(super) struct Rest {
+    shell: Arc<Shell>,
+    thickness: f64,
+    /// See [`Checked::opacity_distance`].
+    opacity_distance: Option<f64>,
+}
+
+/// The parts of the last scene.
+#[derive(Default)]
+pub(super) struct Parts {
+    mesh: Kept<MeshSection, Arc<Mesh>>,
+    shell: Kept<(Same<Mesh>, ShellOptions), Arc<Shell>>,
+    /// The shell before that, whose memory the next may have.
+    spare: Option<Arc<Shell>>,
+    volume: Kept<Texels, Arc<Pyramid>>,
+    directions: Kept<(Same<Pyramid>, (Model, Option<PathBuf>)), Arc<Directions>>,
+    solid_files: Kept<(Option<BaseSection>, Vec<Spanned<SolidSection>>), Arc<Solids>>,
+    solids: Kept<(Same<Solids>, Option<Same<Mesh>>), Arc<[Solid]>>,
+    backdrop: Kept<ImageSection, Backdrop>,
+}
+
+/// A scene's text, read and checked as far as that goes without its mesh and its volume.
+pub(super) struct Checked<'a> {
+    text: &'a Text,
+    file: &'a SceneFile,
+    base_dir: &'a Path,
+    camera: Option<Camera>,
+    mesh: MeshSource<'a>,
+    volume: VolumeSource,
+    lighting: Option<Lighting<'a>>,
+}
+
+impl<'a> Checked<'a> {
+    /// `base_dir` is where the text's paths start.
+    ///
+    /// # Errors
+    /// As [`load`](super::load()).
+    pub(super) fn new(text: &'a Text, file: &'a SceneFile, base_dir: &'a Path) -> Result<Self> {
+        Ok(Self {
+            camera: sight::camera(text, file)?,
+            mesh: MeshSource::of(text, &file.mesh)?,
+            volume: VolumeSource::of(text, &file.volume, base_dir)?,
+            lighting: Lighting::of(text, file, base_dir)?,
+            text,
+            file,
+            base_dir,
+        })
+    }
+
+    fn shell_options(&self) -> ShellOptions {
+        let shell = &self.file.shell;
+        ShellOptions {
+            thickness: shell.thickness.0,
+            thickness_scale: Vec::new(),
+            smoothing_rounds: shell.smoothing.0,
+            uv_scale: DVec2::from_array(shell.uv_scale.0.map(|x| x.0)),
+            uv_rotation: shell.uv_rotation.0.to_radians(),
+            uv_offset: DVec2::from_array(shell.uv_offset.0.map(|x| x.0)),
+        }
+    }
+
+    /// As the file says; otherwise it is one texel along w.
+    fn opacity_distance(&self) -> Option<f64> {
+        let section = self.file.volume.get_ref();
+        // The path that a density of 1 makes one optical depth long.
+        let mean_free_path = section.density.as_ref().map(|density| density.extinction.0.recip());
+        mean_free_path.or(section.opacity_distance.map(|distance| distance.0))
+    }
+
+    /// Blames a texture that is too fine on who made it so.
+    fn resolve(&self, shell: &Shell, size: [u32; 3]) -> Result<()> {
+        span::check(shell, size).map_err(|too_fine| {
+            let mesh = self.file.mesh.get_ref().file.as_ref().map(|file| self.base_dir.join(file));
+            let error = match (self.text.span_of("shell", "uv_scale"), mesh) {
+                (None, Some(mesh)) => Error::input(mesh, too_fine.to_string()),
+                (span, _) => self.text.error(span.unwrap_or(self.file.mesh.span()), too_fine.to_string()),
+            };
+            error.with_help(span::TooFine::HELP)
+        })
+    }
+}
+
+impl Parts {
+    /// The shell of a scene, and what it is made of; `stopwatch` is told what was not kept.
+    fn shell(
+        &mut self,
+        checked: &Checked<'_>,
+        progress: &dyn Progress,
+        stopwatch: &mut Stopwatch,
+    ) -> Result<(Arc<Mesh>, Arc<Shell>)> {
+        let mesh = self.mesh.get(checked.file.mesh.get_ref().clone(), |_| {
+            progress.stage("loading the mesh");
+            let mesh = checked.mesh.load(checked.base_dir)?;
+            stopwatch.lap("load.mesh");
+            Ok(Arc::new(mesh))
+        })?;
+        let before = self.shell.0.as_ref().map(|(_, shell)| shell.clone());
+        let spare = &mut self.spare;
+        let shell = self.shell.get((Same(mesh.clone()), checked.shell_options()), |(_, options)| {
+            progress.stage("building the shell");
+            let shell = match before {
+                Some(before) if before.topology.is_of(&mesh) => {
+                    let moved = before.moved(&mesh, options, spare.take().and_then(Arc::into_inner))?;
+                    *spare = Some(before);
+                    moved
+                }
+                _ => Shell::build(&mesh, options)?,
+            };
+            stopwatch.lap("load.shell");
+            Ok(Arc::new(shell))
+        })?;
+        Ok((mesh, shell))
+    }
+
+    /// The shell of this scene, as that at rest.
+    ///
+    /// # Errors
+    /// As [`load`](super::load()).
+    pub(super) fn rest(&mut self, checked: &Checked<'_>, progress: &dyn Progress) -> Result<Rest> {
+        let (_, shell) = self.shell(checked, progress, &mut Stopwatch::start())?;
+        let opacity_distance = checked.opacity_distance();
+        Ok(Rest { shell, thickness: checked.file.shell.thickness.0, opacity_distance })
+    }
+
+    /// The scene; without a shell at `rest` its own is.
+    ///
+    /// # Errors
+    /// As [`load_if`](super::load_if).
+    pub(super) fn build(
+        &mut self,
+        checked: &Checked<'_>,
+        rest: Option<&Rest>,
+        progress: &dyn Progress,
+        admit: &dyn Fn(&Sizes) -> Result<()>,
+    ) -> Result<Loaded> {
+        let Checked { text, file, base_dir, .. } = *checked;
+        let mut stopwatch = Stopwatch::start();
+        // All that other files can have wrong is told before a long load, those that are quick to read first.
+        let of_solids = (file.base.clone(), file.solid.clone());
+        let solid_files = self.solid_files.get(of_solids, |(base, solids)| {
+            Solids::read(text, base.as_ref(), solids, base_dir).map(Arc::new)
+        })?;
+        let backdrop = self.backdrop.get(file.image.clone(), |image| backdrop::read(image, base_dir))?;
+        let [width, height] = file.image.size.0.map(|pixels| pixels.0);
+        let admit = |volume| admit(&Sizes { picture: [width, height], volume });
+        if let VolumeSource::Recipe(recipe) = &checked.volume {
+            admit(recipe.header().size)?;
+        }
+
+        let (mesh, shell) = self.shell(checked, progress, &mut stopwatch)?;
+        let camera = checked.camera.unwrap_or_else(|| Camera::framing(&shell.vertices));
+        if let Some(lighting) = &checked.lighting {
+            lighting.check_camera(text, &camera)?;
+        }
+
+        let thickness = file.shell.thickness.0;
+        let opacity_distance = checked.opacity_distance();
+        let own = Rest { shell: shell.clone(), thickness, opacity_distance };
+        let rest = rest.unwrap_or(&own);
+        let section = file.volume.get_ref();
+        let texels = Texels {
+            section: section.texels(),
+            haze: section.haze.as_ref().map(|_| (opacity_distance, thickness)),
+            rest: (Same(rest.shell.clone()), rest.opacity_distance),
+        };
+        let volume = self.volume.get(texels, |_| {
+            progress.stage("loading the volume");
+            let mut volume = checked.volume.load(&admit, &|size| checked.resolve(&shell, size))?;
+            let distance = |explicit: Option<f64>, thickness: f64| {
+                explicit.unwrap_or(thickness / f64::from(volume.size[2]))
+            };
+            let texel = {
+                let distance = distance(rest.opacity_distance, rest.thickness);
+                texel_edges(&rest.shell, volume.size).map(|edge| edge / distance)
+            };
+            if let Some(HazeSection { alpha, colour }) = &section.haze {
+                let depth = -(-alpha.0).ln_1p() * distance(opacity_distance, thickness) / thickness;
+                Haze { colour: colour.0, depth }.fill(&mut volume);
+            }
+            stopwatch.lap("load.volume");
+            progress.stage("filtering the volume");
+            let pyramid = Pyramid::build_with(volume, section.filter, texel);
+            stopwatch.lap("load.pyramid");
+            Ok(Arc::new(pyramid))
+        })?;
+        let size = volume.levels[0].size;
+        checked.resolve(&shell, size)?;
+
+        let shading = checked.lighting.as_ref().map(|lighting| {
+            let directions = self.directions.get((Same(volume.clone()), lighting.origin()), |_| {
+                progress.stage("finding the volume's directions");
+                let directions = lighting.directions(&volume.levels[0])?;
+                stopwatch.lap("load.directions");
+                Ok(Arc::new(directions))
+            });
+            Ok::<_, Error>(lighting.shading(directions?))
+        });
+        let base = solid_files.has_base().then(|| Same(mesh.clone()));
+        let solids = self.solids.get((Same(solid_files), base), |(files, _)| Ok(files.0.build(&mesh)))?;
+        let scene = Scene {
+            view: View { camera, width, height, depth: false },
+            medium: Medium {
+                opacity_distance: opacity_distance.unwrap_or(thickness / f64::from(size[2])),
+                lod_footprint: section.lod_footprint.0,
+            },
+            march: match file.march.plan {
+                Plan::Default => March::Default { step: file.march.step.0 },
+                Plan::Paper => March::Paper { samples: file.march.samples.0 },
+                Plan::Exact => March::Exact,
+            },
+            shading: shading.transpose()?,
+            solids,
+            shell,
+            volume,
+        };
+        Ok(Loaded { scene, backdrop, stages: stopwatch.finish() })
+    }
+}

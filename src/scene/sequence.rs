@@ -1,0 +1,119 @@
+//! A scene in time: its frames, each a scene, that share all that does not change between them.
+
+use std::path::{Path, PathBuf};
+
+use super::file::SceneFile;
+use super::load::Loaded;
+use super::parts::{Checked, Parts, Rest};
+use super::text::Text;
+use super::timeline::{Timeline, Track};
+use super::{Sizes, files, load};
+use crate::progress::Progress;
+use crate::{Error, Result};
+
+/// An animated scene.
+pub struct Sequence {
+    text: Text,
+    base_dir: PathBuf,
+    timeline: Timeline,
+    tracks: Vec<Track>,
+    parts: Parts,
+    /// Once it was needed.
+    rest: Option<Rest>,
+}
+
+/// All that makes a frame, beside the program.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct FrameInputs {
+    /// The scene as it is in that frame, and in the first, whose shell is the one at rest; in TOML.
+    pub text: String,
+    /// Every file that is read; sorted, none twice.
+    pub files: Vec<PathBuf>,
+}
+
+/// The sections that make an animation, and no frame.
+const OF_TIME: [&str; 2] = ["timeline", "track"];
+
+impl Sequence {
+    /// Reads a scene file with overrides laid over it, as [`load`](super::load()) does. What the text says is checked at every
+    /// frame.
+    ///
+    /// # Errors
+    /// As [`load`](super::load()); an error in a frame names the tracks that make it.
+    pub fn open(path: &Path, overrides: &[String]) -> Result<Self> {
+        Self::of(load::text(path, overrides)?, path.parent().unwrap_or(Path::new("")))
+    }
+
+    fn of(text: Text, base_dir: &Path) -> Result<Self> {
+        let file: SceneFile = load::read(&text)?;
+        let timeline = Timeline::of(file.timeline.as_ref());
+        let tracks = Track::all(&text, &file, &timeline)?;
+        let base_dir = base_dir.to_owned();
+        let sequence = Self { text, base_dir, timeline, tracks, parts: Parts::default(), rest: None };
+        for frame in 1..=if sequence.tracks.is_empty() { 1 } else { timeline.frames } {
+            let text = sequence.text_at(frame)?;
+            Checked::new(&text, &load::read(&text)?, &sequence.base_dir)?;
+        }
+        Ok(sequence)
+    }
+
+    /// How long it lasts.
+    pub fn timeline(&self) -> &Timeline {
+        &self.timeline
+    }
+
+    /// The scene as it is in a frame. What is the same as in the frame that was asked for last is shared with it, and its loading
+    /// has no stage.
+    ///
+    /// Coarser levels of the volume are made for the shell of the first frame.
+    ///
+    /// # Errors
+    /// As [`load_if`](super::load_if); [`Error::Usage`] for a frame that is not in the timeline.
+    pub fn at(
+        &mut self,
+        frame: u32,
+        progress: &dyn Progress,
+        admit: &dyn Fn(&Sizes) -> Result<()>,
+    ) -> Result<Loaded> {
+        self.check(frame)?;
+        if self.rest.is_none() && !self.tracks.is_empty() {
+            let text = self.text_at(1)?;
+            let file = load::read(&text)?;
+            let checked = Checked::new(&text, &file, &self.base_dir)?;
+            self.rest = Some(self.parts.rest(&checked, progress)?);
+        }
+        let text = self.text_at(frame)?;
+        let file = load::read(&text)?;
+        let checked = Checked::new(&text, &file, &self.base_dir)?;
+        self.parts.build(&checked, self.rest.as_ref(), progress, admit)
+    }
+
+    /// All that makes a frame, for those who keep its picture.
+    ///
+    /// # Errors
+    /// As [`Sequence::at`].
+    pub fn inputs(&self, frame: u32) -> Result<FrameInputs> {
+        self.check(frame)?;
+        let text = self.text_at(frame)?;
+        let files = files::of(&text.plain(&OF_TIME)?, &self.base_dir);
+        let text = text.plain(&OF_TIME)? + "\n# At rest:\n" + &self.text_at(1)?.plain(&OF_TIME)?;
+        Ok(FrameInputs { text, files })
+    }
+
+    fn check(&self, frame: u32) -> Result<()> {
+        let frames = self.timeline.frames;
+        if (1..=frames).contains(&frame) {
+            return Ok(());
+        }
+        Err(Error::Usage {
+            message: format!("there is no frame {frame}: the scene has those from 1 to {frames}"),
+            help: Some("the section [timeline] says how many `frames` there are".into()),
+        })
+    }
+
+    fn text_at(&self, frame: u32) -> Result<Text> {
+        let time = self.timeline.time(frame);
+        let layers = self.tracks.iter().map(|track| track.at(time)).collect::<Result<_>>()?;
+        Ok(self.text.with(layers))
+    }
+}
