@@ -122,6 +122,7 @@ pub fn measure(
     for round in subject.runs - rounds_left..subject.runs {
         remaining.stage(&format!("{name}: round {} of {}", round + 1, subject.runs));
         for (contender, point) in contenders.iter_mut().zip(&mut results.points) {
+            contender.method.forget();
             let start = Instant::now();
             let frame = contender.method.render(&scene.view)?;
             point.push(1e3 * start.elapsed().as_secs_f64(), &frame.report.stages);

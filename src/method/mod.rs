@@ -33,6 +33,16 @@ pub trait Method {
     /// [`Error::Device`](crate::Error::Device), [`Error::OutOfMemory`](crate::Error::OutOfMemory), or
     /// [`Error::Interrupted`](crate::Error::Interrupted).
     fn render(&mut self, view: &View) -> Result<Frame>;
+
+    /// Takes another scene in place of the one that there is, and keeps what was made of the parts that the two share
+    /// ([`Arc::ptr_eq`]): the next frame of an animation. The next report says what was kept. On an error the method is as before.
+    ///
+    /// # Errors
+    /// As [`Opened::prepare`].
+    fn update(&mut self, scene: Arc<Scene>) -> Result<()>;
+
+    /// Forgets what the last frame has left for one from the same eye, so that the next is timed whole.
+    fn forget(&mut self);
 }
 
 /// A method that has no scene yet, with its device where it needs one.

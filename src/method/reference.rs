@@ -41,4 +41,11 @@ impl Method for Reference {
         let Opened { progress, interrupt } = &self.opened;
         crate::reference::render(&self.scene, view, progress.as_ref(), interrupt)
     }
+
+    fn update(&mut self, scene: Arc<Scene>) -> Result<()> {
+        self.scene = scene;
+        Ok(())
+    }
+
+    fn forget(&mut self) {}
 }

@@ -76,6 +76,12 @@ pub(super) struct Rest {
     opacity_distance: Option<f64>,
 }
 
+/// The volume, and what [`Lighting::origin`] tells.
+type OfDirections = (Same<Pyramid>, (Model, Option<PathBuf>));
+type OfSolidFiles = (Option<BaseSection>, Vec<Spanned<SolidSection>>);
+/// The base mesh, where it is one.
+type OfSolids = (Same<Solids>, Option<Same<Mesh>>);
+
 /// The parts of the last scene.
 #[derive(Default)]
 pub(super) struct Parts {
@@ -84,9 +90,9 @@ pub(super) struct Parts {
     /// The shell before that, whose memory the next may have.
     spare: Option<Arc<Shell>>,
     volume: Kept<Texels, Arc<Pyramid>>,
-    directions: Kept<(Same<Pyramid>, (Model, Option<PathBuf>)), Arc<Directions>>,
-    solid_files: Kept<(Option<BaseSection>, Vec<Spanned<SolidSection>>), Arc<Solids>>,
-    solids: Kept<(Same<Solids>, Option<Same<Mesh>>), Arc<[Solid]>>,
+    directions: Kept<OfDirections, Arc<Directions>>,
+    solid_files: Kept<OfSolidFiles, Arc<Solids>>,
+    solids: Kept<OfSolids, Arc<[Solid]>>,
     backdrop: Kept<ImageSection, Backdrop>,
 }
 

@@ -113,7 +113,7 @@ impl Text {
     /// As [`parse`](Self::parse).
     pub fn plain(&self, without: &[&str]) -> Result<String> {
         let mut table: toml::Table = self.read(self.tree()?)?;
-        table.retain(|section, _| !without.iter().any(|&one| one == section));
+        table.retain(|section, _| !without.contains(&section));
         Ok(table.to_string())
     }
 

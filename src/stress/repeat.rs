@@ -41,6 +41,7 @@ fn runs(stand: &Stand<'_>) -> Result<f64> {
         if run % 2 == 0 {
             method = stand.prepare(&scene)?;
         }
+        method.forget();
         differ += differing(&method.render(&scene.view)?.image, &first);
     }
     Ok(differ as f64)

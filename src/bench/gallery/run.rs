@@ -137,6 +137,7 @@ impl Easel<'_> {
         // In the first frame pipelines are compiled and buffers made.
         method.render(&scene.view)?;
         let start = Instant::now();
+        method.forget();
         let frame = method.render(&scene.view)?;
         let frame_milliseconds = milliseconds(start);
         let told = frame.report.warnings.iter().map(|warning| format!("{}: {warning}", self.path.display()));

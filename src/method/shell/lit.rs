@@ -102,11 +102,19 @@ impl Lit {
     /// buffers are too small.
     pub fn new(gpu: &Arc<Gpu>, shell: &Shell, shading: &Shading) -> Result<Self> {
         let directions = Texture3d::upload_directions(gpu, "the directions", &shading.directions)?;
-        let shell::Frames { maps, of_vertices } = shell.frames(shading.model.frame_kind());
-        let column = |column: DVec3| column.as_vec3().extend(0.0).to_array();
-        let frame = |map: &glam::DMat3| Frame { columns: [map.x_axis, map.y_axis, map.z_axis].map(column) };
-        let frames: Vec<Frame> = maps.iter().map(frame).collect();
+        let (frames, of_vertices) = frames(shell, shading);
         Ok(Self { directions, frames: Buffer::storage(gpu, "the shell's frames", &frames)?, of_vertices })
+    }
+
+    /// The same directions in another shell.
+    ///
+    /// # Errors
+    /// As [`Lit::new`].
+    pub fn place(&mut self, shell: &Shell, shading: &Shading) -> Result<()> {
+        let (frames, of_vertices) = frames(shell, shading);
+        self.frames.refill(&frames)?;
+        self.of_vertices = of_vertices;
+        Ok(())
     }
 
     fn cells(&self, shell: &Shell, seen: &Seen) -> Vec<LitCell> {
@@ -117,6 +125,14 @@ impl Lit {
         };
         seen.tetrahedra.par_iter().map(cell).collect()
     }
+}
+
+/// The frames of a shell, and which of them each tetrahedron's vertices have.
+fn frames(shell: &Shell, shading: &Shading) -> (Vec<Frame>, Vec<[u32; 4]>) {
+    let shell::Frames { maps, of_vertices } = shell.frames(shading.model.frame_kind());
+    let column = |column: DVec3| column.as_vec3().extend(0.0).to_array();
+    let frame = |map: &glam::DMat3| Frame { columns: [map.x_axis, map.y_axis, map.z_axis].map(column) };
+    (maps.iter().map(frame).collect(), of_vertices)
 }
 
 impl LitView {
@@ -134,12 +150,14 @@ impl LitView {
         })
     }
 
-    /// The same into the buffers that there are.
+    /// The same into the buffers that there are; the cells where they are others than before.
     ///
     /// # Errors
     /// As [`Lit::new`].
-    pub fn refill(&mut self, lit: &Lit, sight: Sight<'_>) -> Result<()> {
-        self.cells.refill(&lit.cells(sight.shell, sight.seen))?;
+    pub fn refill(&mut self, lit: &Lit, sight: Sight<'_>, cells: bool) -> Result<()> {
+        if cells {
+            self.cells.refill(&lit.cells(sight.shell, sight.seen))?;
+        }
         if let (Some(buffer), Some(pictures)) = (&mut self.pictures, sight.pictures()) {
             buffer.refill(&pictures)?;
         }

@@ -17,6 +17,7 @@ pub mod solids;
 use std::sync::Arc;
 
 use bytemuck::{Pod, Zeroable};
+use glam::DVec3;
 
 use self::lit::{Lit, LitView, Sight};
 use self::seen::{Run, Seen};
@@ -30,6 +31,7 @@ use crate::gpu::{
 use crate::order::{Sorted, Sorter};
 use crate::progress::{Interrupt, Progress};
 use crate::scene::{March, Model, Scene, Sizes, View, span};
+use crate::shell;
 use crate::volume::{Pyramid, Quantity};
 use crate::{Error, Result};
 
@@ -67,6 +69,18 @@ struct Shell {
     texels: f64,
     // What a frame of one size and kind needs, kept for the next frame.
     canvas: Option<Canvas>,
+    last: Option<Last>,
+    /// What the last update has kept, each a sentence.
+    kept: Vec<String>,
+}
+
+/// How the shell was seen last.
+struct Last {
+    view: View,
+    vertices: Arc<Vec<DVec3>>,
+    sorted: Sorted,
+    /// And of what, unless that has changed.
+    seen: Option<(Seen, Arc<shell::Shell>)>,
 }
 
 /// The target of a picture and the pipeline that draws into it.
@@ -106,13 +120,16 @@ impl Canvas {
 }
 
 /// What a canvas depends on.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 struct CanvasKind {
     width: u32,
     height: u32,
     depth: bool,
-    minified: bool,
     cycles: bool,
+    /// What is compiled into the shaders: what the scene has, and what is asked for.
+    switches: Vec<&'static str>,
+    /// Their specialisation constants.
+    constants: Vec<u32>,
 }
 
 /// A device without a scene.
@@ -139,12 +156,7 @@ impl super::Opened for Opened {
 
     fn prepare(self: Box<Self>, scene: Arc<Scene>) -> Result<Box<dyn Method>> {
         let Self { gpu, progress, interrupt } = *self;
-        let size = scene.volume.levels[0].size;
-        span::check(&scene.shell, size).map_err(|too_fine| Error::Usage {
-            message: too_fine.to_string(),
-            help: Some(span::TooFine::HELP.into()),
-        })?;
-        let texels = span::longest(&scene.shell, size);
+        let texels = longest_span(&scene)?;
         progress.stage("uploading the volume");
         let volume = Texture3d::upload(&gpu, "the volume", &scene.volume)?;
         let lit = scene.shading.as_ref().map(|shading| Lit::new(&gpu, &scene.shell, shading)).transpose()?;
@@ -162,6 +174,8 @@ impl super::Opened for Opened {
             solids,
             texels,
             canvas: None,
+            last: None,
+            kept: Vec::new(),
         }))
     }
 }
@@ -170,34 +184,50 @@ impl Method for Shell {
     fn render(&mut self, view: &View) -> Result<Frame> {
         let mut watch = Stopwatch::start();
         self.interrupt.check()?;
-        self.progress.stage("sorting the tetrahedra");
-        let sorted = self.sorter.sort(&self.scene.shell, view);
-        watch.lap("order");
-        watch.add("order.relations", sorted.times.relations);
-        watch.add("order.abuffer", sorted.times.abuffer);
-        watch.add("order.search", sorted.times.search);
+        let last = self.last.take().filter(|last| last.view == *view);
+        let last = last.filter(|last| Arc::ptr_eq(&last.vertices, &self.scene.shell.vertices));
+        let mut kept = std::mem::take(&mut self.kept);
+        let (sorted, seen) = match last {
+            Some(Last { sorted, seen, .. }) => {
+                kept.push("the order is kept: neither the geometry nor the camera has moved".into());
+                (sorted, seen)
+            }
+            None => {
+                self.progress.stage("sorting the tetrahedra");
+                let sorted = self.sorter.sort(&self.scene.shell, view);
+                watch.lap("order");
+                watch.add("order.relations", sorted.times.relations);
+                watch.add("order.abuffer", sorted.times.abuffer);
+                watch.add("order.search", sorted.times.search);
+                (sorted, None)
+            }
+        };
 
         self.interrupt.check()?;
-        self.progress.stage("mapping the view");
-        let seen = Seen::new(&self.scene, &sorted, view, self.gpu.subpixels());
-        watch.lap("see");
+        let seen = seen.filter(|(_, shell)| Arc::ptr_eq(shell, &self.scene.shell));
+        let is_uploaded = seen.is_some() && self.canvas.is_some();
+        let seen = match seen {
+            Some((seen, _)) => seen,
+            None => {
+                self.progress.stage("mapping the view");
+                let seen = Seen::new(&self.scene, &sorted, view, self.gpu.subpixels());
+                watch.lap("see");
+                seen
+            }
+        };
         let keeps_shadows = self.shadows.is_some();
         if !keeps_shadows {
             let shadows =
                 Shadows::draw(&self.gpu, &self.scene, &self.volume, &*self.progress, &self.interrupt)?;
+            if shadows.is_some() {
+                watch.lap("shadows");
+            }
             self.shadows = Some(shadows);
-            watch.lap("shadows");
         }
         self.progress.stage("uploading the view");
-        let kind = CanvasKind {
-            width: view.width,
-            height: view.height,
-            depth: view.depth,
-            minified: seen.minified,
-            cycles: !seen.tiles.is_empty(),
-        };
-        let kept = self.canvas.take();
-        let canvas = self.canvas(kept, kind, &seen, view)?;
+        let kind = self.kind(&seen, view);
+        let canvas = self.canvas.take();
+        let canvas = self.canvas(canvas, kind, &seen, view, is_uploaded)?;
         let canvas = &*self.canvas.insert(canvas);
         watch.lap("upload");
 
@@ -268,26 +298,142 @@ impl Method for Shell {
         )?;
         watch.lap("left");
         let mut report = self.report(&sorted, &seen, &rgba);
+        report.skipped.extend(kept);
         if keeps_shadows && shadows.is_some() {
             report.skipped.push("shadows are kept: they do not depend on the camera".into());
         }
         report.counts.insert("pixels_left_to_host".to_owned(), left);
         report.stages = watch.finish();
+        let (vertices, shell) = (self.scene.shell.vertices.clone(), self.scene.shell.clone());
+        self.last = Some(Last { view: *view, vertices, sorted, seen: Some((seen, shell)) });
         Ok(Frame { image: Image { width: view.width, height: view.height, rgba }, depth, report })
     }
+
+    fn update(&mut self, scene: Arc<Scene>) -> Result<()> {
+        let before = &self.scene;
+        let same_shell = Arc::ptr_eq(&before.shell, &scene.shell);
+        let same_volume = Arc::ptr_eq(&before.volume, &scene.volume);
+        let same_solids = Arc::ptr_eq(&before.solids, &scene.solids);
+        let size = scene.volume.levels[0].size;
+        let mut kept = Vec::new();
+        let texels = if same_shell && size == before.volume.levels[0].size {
+            self.texels
+        } else {
+            longest_span(&scene)?
+        };
+
+        let volume = if same_volume {
+            kept.push("the volume is kept on the device: it is the same".to_owned());
+            None
+        } else {
+            self.progress.stage("uploading the volume");
+            Some(Texture3d::upload(&self.gpu, "the volume", &scene.volume)?)
+        };
+        let same_directions = match (&before.shading, &scene.shading) {
+            (Some(a), Some(b)) => Arc::ptr_eq(&a.directions, &b.directions) && a.model == b.model,
+            (None, None) => true,
+            _ => false,
+        };
+        let lit = match &scene.shading {
+            Some(shading) if !same_directions => Some(Lit::new(&self.gpu, &scene.shell, shading)?),
+            _ => None,
+        };
+        let solids = if solids::have_same_textures(&before.solids, &scene.solids) {
+            None
+        } else {
+            Some(Solids::new(&self.gpu, &scene.solids)?)
+        };
+        if let (Some(lit), Some(shading), true, false) =
+            (&mut self.lit, &scene.shading, same_directions, same_shell)
+        {
+            lit.place(&scene.shell, shading)?;
+        }
+
+        // Nothing fails from here on.
+        if same_directions {
+            if scene.shading.is_some() {
+                kept.push("the volume's directions are kept on the device: they are the same".to_owned());
+            }
+        } else {
+            self.lit = lit;
+        }
+        if let Some(volume) = volume {
+            self.volume = volume;
+        }
+        if let Some(solids) = solids {
+            self.solids = solids;
+        }
+        if !(same_shell && same_volume && same_solids && has_same_shadows(before, &scene)) {
+            self.shadows = None;
+        }
+        let same_topology = Arc::ptr_eq(&before.shell.topology, &scene.shell.topology);
+        if !same_topology {
+            self.sorter = Sorter::new(&scene.shell.topology);
+            self.last = None;
+        }
+        if same_shell {
+            kept.push("the shell is kept: nothing of it has moved".to_owned());
+        } else if same_topology {
+            kept.push("the shell's topology is kept: the triangles are the same".to_owned());
+        }
+        if let Some(last) = &mut self.last
+            && (!same_directions
+                || before.medium.lod_footprint != scene.medium.lod_footprint
+                || size != before.volume.levels[0].size
+                || scene.volume.levels.len() != before.volume.levels.len())
+        {
+            last.seen = None;
+        }
+        (self.texels, self.kept, self.scene) = (texels, kept, scene);
+        Ok(())
+    }
+
+    fn forget(&mut self) {
+        self.last = None;
+    }
+}
+
+/// Whether all that lights see of two scenes is alike, if shell, volume and solids are.
+fn has_same_shadows(a: &Scene, b: &Scene) -> bool {
+    let lights =
+        |scene: &Scene| scene.shading.as_ref().map(|shading| (shading.lights.clone(), shading.shadow_size));
+    lights(a) == lights(b) && a.medium == b.medium && a.march == b.march
+}
+
+/// The most texels that a ray passes in one tetrahedron.
+///
+/// # Errors
+/// [`Error::Usage`] where f32 does not resolve so many.
+fn longest_span(scene: &Scene) -> Result<f64> {
+    let size = scene.volume.levels[0].size;
+    span::check(&scene.shell, size).map_err(|too_fine| Error::Usage {
+        message: too_fine.to_string(),
+        help: Some(span::TooFine::HELP.into()),
+    })?;
+    Ok(span::longest(&scene.shell, size))
 }
 
 impl Shell {
     /// The canvas for this frame, with what was seen in its buffers: the one of the frame before, where it is of that kind.
-    fn canvas(&self, kept: Option<Canvas>, kind: CanvasKind, seen: &Seen, view: &View) -> Result<Canvas> {
+    /// `is_uploaded`: that has been seen in the frame before, too.
+    fn canvas(
+        &self,
+        kept: Option<Canvas>,
+        kind: CanvasKind,
+        seen: &Seen,
+        view: &View,
+        is_uploaded: bool,
+    ) -> Result<Canvas> {
         let Some(mut canvas) = kept.filter(|canvas| canvas.kind == kind) else {
             return self.new_canvas(kind, seen, view);
         };
-        canvas.cells.refill(&seen.cells)?;
-        canvas.tiles.refill(&seen.tiles)?;
-        canvas.members.refill(&seen.members)?;
+        if !is_uploaded {
+            canvas.cells.refill(&seen.cells)?;
+            canvas.tiles.refill(&seen.tiles)?;
+            canvas.members.refill(&seen.members)?;
+        }
         if let (Some(lit), Some(kept), Some(sight)) = (&self.lit, &mut canvas.lit, self.sight(seen, view)) {
-            kept.refill(lit, sight)?;
+            kept.refill(lit, sight, !is_uploaded)?;
         }
         Ok(canvas)
     }
@@ -299,28 +445,34 @@ impl Shell {
         Some(Sight { shading, shadows, shell: &self.scene.shell, seen, view })
     }
 
-    /// What is compiled into the shaders: what the scene has, and what is asked for.
-    fn switches(&self, kind: CanvasKind) -> Vec<&'static str> {
+    fn kind(&self, seen: &Seen, view: &View) -> CanvasKind {
         let has_shadows = self.shadows.iter().flatten().next().is_some();
         let switches = [
-            ("DEPTH", kind.depth),
+            ("DEPTH", view.depth),
             ("SOLIDS", self.solids.is_some()),
             ("LIT", self.lit.is_some()),
             ("SHADOWS", has_shadows),
         ];
-        switches.into_iter().filter_map(|(name, is_on)| is_on.then_some(name)).collect()
+        let mut constants = constants_of_volume(self.scene.march, seen.minified, &self.scene.volume).to_vec();
+        if let Some(shading) = &self.scene.shading {
+            constants.extend([shading.model == Model::Fibre, shading.emission.glow > 0.0].map(u32::from));
+        }
+        CanvasKind {
+            width: view.width,
+            height: view.height,
+            depth: view.depth,
+            cycles: !seen.tiles.is_empty(),
+            switches: switches.into_iter().filter_map(|(name, is_on)| is_on.then_some(name)).collect(),
+            constants,
+        }
     }
 
     fn new_canvas(&self, kind: CanvasKind, seen: &Seen, view: &View) -> Result<Canvas> {
         let target = Target::new(&self.gpu, kind.width, kind.height, if kind.depth { 2 } else { 1 })?;
-        let on = self.switches(kind);
-        let mut constants = constants_of_volume(self.scene.march, kind.minified, &self.scene.volume).to_vec();
-        if let Some(shading) = &self.scene.shading {
-            constants.extend([shading.model == Model::Fibre, shading.emission.glow > 0.0].map(u32::from));
-        }
+        let on = &kind.switches;
         let mut buffers = vec![0, 1, 2];
         let mut textures = vec![8];
-        for &switch in &on {
+        for &switch in on {
             let (more_buffers, more_textures): (&[u32], &[u32]) = match switch {
                 "LIT" => (&[3, 4, 5], &[9]),
                 "SHADOWS" => (&[6], &[10, 11, 12, 13]),
@@ -334,9 +486,9 @@ impl Shell {
             textures.push(14);
         }
         let info = PipelineInfo {
-            vertex: shaders::SHELL_VERT.with(&on),
-            fragment: shaders::SHELL_FRAG.with(&on),
-            constants: &constants,
+            vertex: shaders::SHELL_VERT.with(on),
+            fragment: shaders::SHELL_FRAG.with(on),
+            constants: &kind.constants,
             storage_buffers: &buffers,
             textures: &textures,
             push_constant_bytes: size_of::<ViewConstants>() as u32,
@@ -344,24 +496,21 @@ impl Shell {
         };
         let sorted = Pipeline::new(&self.gpu, &target, &info)?;
         let of_cycles = PipelineInfo {
-            vertex: shaders::TILE_VERT.with(&on),
-            fragment: shaders::CYCLE_FRAG.with(&on),
+            vertex: shaders::TILE_VERT.with(on),
+            fragment: shaders::CYCLE_FRAG.with(on),
             ..info
         };
         let cycle = kind.cycles.then(|| Pipeline::new(&self.gpu, &target, &of_cycles)).transpose()?;
         let solids = self.solids.as_ref().map(|_| {
             let layer = PipelineInfo {
-                vertex: shaders::LAYER_VERT.with(&on),
-                fragment: shaders::LAYER_FRAG.with(&on),
+                vertex: shaders::LAYER_VERT.with(on),
+                fragment: shaders::LAYER_FRAG.with(on),
                 constants: &[],
                 storage_buffers: &[],
                 textures: &[15, 16],
                 ..info
             };
-            Ok::<_, Error>((
-                SolidView::new(&self.gpu, view, &on)?,
-                Pipeline::new(&self.gpu, &target, &layer)?,
-            ))
+            Ok::<_, Error>((SolidView::new(&self.gpu, view, on)?, Pipeline::new(&self.gpu, &target, &layer)?))
         });
         let lit = match (&self.lit, self.sight(seen, view)) {
             (Some(lit), Some(sight)) => Some(LitView::new(&self.gpu, lit, sight)?),

@@ -51,6 +51,16 @@ impl Solids {
     }
 }
 
+/// Whether what [`Solids::new`] uploads of the two is the same.
+pub fn have_same_textures(a: &[Solid], b: &[Solid]) -> bool {
+    let same = |(a, b): (&Solid, &Solid)| match (&a.texture, &b.texture) {
+        (Some(a), Some(b)) => Arc::ptr_eq(a, b),
+        (None, None) => true,
+        _ => false,
+    };
+    a.len() == b.len() && a.iter().zip(b).all(same)
+}
+
 /// A picture of them, and what draws it.
 pub struct SolidView {
     target: Target,
