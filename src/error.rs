@@ -102,6 +102,21 @@ impl Error {
         self
     }
 
+    /// The same error, said to be of something: `"frame 12"`.
+    #[must_use]
+    pub fn of(mut self, what: &str) -> Self {
+        match &mut self {
+            Self::Usage { message, .. }
+            | Self::Input { message, .. }
+            | Self::Text { message, .. }
+            | Self::Device { message, .. }
+            | Self::OutOfMemory { message, .. }
+            | Self::Output { message, .. } => *message = format!("{what}: {message}"),
+            Self::Interrupted => {}
+        }
+        self
+    }
+
     /// The exit code that the command line reports for this error.
     pub fn exit_code(&self) -> u8 {
         match self {

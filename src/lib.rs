@@ -30,6 +30,7 @@
 
 pub mod bench;
 pub mod error;
+pub mod film;
 pub mod frame;
 pub mod gpu;
 mod input;

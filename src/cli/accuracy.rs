@@ -27,6 +27,11 @@ pub struct Arguments {
 }
 
 impl Arguments {
+    /// Whether an error is accepted.
+    pub fn is_used(&self) -> bool {
+        self.max_error.is_some()
+    }
+
     /// Whether `--max-error` goes with the rest.
     ///
     /// # Errors

@@ -6,6 +6,7 @@ mod accuracy;
 mod bench;
 mod devices;
 mod diff;
+mod frames;
 mod gallery;
 mod mesh;
 mod output;
@@ -18,6 +19,7 @@ use std::io::IsTerminal;
 use std::process::ExitCode;
 
 use clap::{Args, Parser, Subcommand};
+use mesoshell::Error;
 
 const EXIT_CODES: &str = "\
 Exit codes:
@@ -30,7 +32,8 @@ Exit codes:
   4    no usable Vulkan device
   5    out of memory, the machine's or the device's
   6    a result cannot be written
-  130  interrupted";
+  130  interrupted
+  143  ended by SIGTERM";
 
 /// Renders semi-transparent 3D textures mapped into a shell around a triangle mesh.
 #[derive(Parser)]
@@ -90,7 +93,10 @@ pub fn run() -> ExitCode {
         Command::Stress(arguments) => stress::run(arguments, talk),
     };
     done.unwrap_or_else(|error| {
-        let code = error.exit_code();
+        let code = match error {
+            Error::Interrupted => progress::exit_code_of_interrupt(),
+            _ => error.exit_code(),
+        };
         output::complain(&format!("{:?}", miette::Report::new(error)));
         code.into()
     })

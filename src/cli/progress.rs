@@ -1,12 +1,15 @@
 //! Progress on standard error: one line that is drawn over on a terminal, else one line a finished stage.
 
 use std::io::{IsTerminal, stderr};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use mesoshell::Error;
 use mesoshell::progress::{Interrupt, Progress};
+use signal_hook::consts::{SIGINT, SIGTERM};
+use signal_hook::iterator::Signals;
 
 use super::{Talk, output};
 
@@ -69,15 +72,26 @@ impl Drop for Line {
     }
 }
 
+/// Which of the two ended the run.
+static TERMINATED: AtomicBool = AtomicBool::new(false);
+
+/// The exit code of a run that was ended from outside: 128 and the number of the signal, as shells have it.
+pub fn exit_code_of_interrupt() -> u8 {
+    if TERMINATED.load(Ordering::Relaxed) { 143 } else { Error::Interrupted.exit_code() }
+}
+
 /// Lets the first Ctrl-C or SIGTERM end the run at its next check, and the second one at once.
 pub fn listen(interrupt: &Interrupt) {
     let interrupt = interrupt.clone();
-    let handler = move || {
-        if interrupt.is_set() {
-            std::process::exit(Error::Interrupted.exit_code().into());
-        }
-        interrupt.set();
-    };
     // Without a handler the system's own ends the process, which will do.
-    let _ = ctrlc::set_handler(handler);
+    let Ok(mut signals) = Signals::new([SIGINT, SIGTERM]) else { return };
+    std::thread::spawn(move || {
+        for signal in signals.forever() {
+            if interrupt.is_set() {
+                std::process::exit(exit_code_of_interrupt().into());
+            }
+            TERMINATED.store(signal == SIGTERM, Ordering::Relaxed);
+            interrupt.set();
+        }
+    });
 }

@@ -6,6 +6,7 @@ use std::sync::Arc;
 
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser};
+use mesoshell::film::FrameRange;
 use mesoshell::frame::{Report, Stage, Stopwatch, file};
 use mesoshell::gpu::{DeviceChoice, Messages};
 use mesoshell::method::{self, METHODS, Setup};
@@ -17,34 +18,69 @@ use serde::Serialize;
 
 use super::accuracy::{self, Accuracy};
 use super::progress::{Line, listen};
-use super::{Talk, table};
+use super::{Talk, frames, table};
 
 /// Render a scene to a picture
 #[derive(Args)]
 pub struct Arguments {
     /// The scene file; docs/scene.md lists its keys
-    scene: PathBuf,
-    /// The picture: .png (sRGB, 8 bits) or .exr (linear, float); by default the scene's name with .png, in the
-    /// working directory
+    pub(super) scene: PathBuf,
+    /// The picture: .png (sRGB, 8 bits) or .exr (linear, float), of several frames with #### or {frame:04} in its name; or a
+    /// film: .gif, .apng, .y4m, or - for .y4m on standard output; by default the scene's name with .png, in the working
+    /// directory
     #[arg(short, long, value_name = "FILE")]
-    output: Option<PathBuf>,
+    pub(super) output: Option<PathBuf>,
+    /// Which frames of an animated scene: 1-120, 1-100x5, 3,5-10, all; by default the first, of a film all
+    #[arg(long, value_name = "RANGE")]
+    pub(super) frames: Option<FrameRange>,
+    /// Render the frames again whose pictures are up to date
+    #[arg(long)]
+    pub(super) overwrite: bool,
+    /// One of the scene's cameras, [cameras.NAME]
+    #[arg(long, value_name = "NAME")]
+    camera: Option<String>,
     /// Width and height in pixels, instead of the scene's
     #[arg(long, value_name = "WxH", value_parser = size)]
-    size: Option<PictureSize>,
+    pub(super) size: Option<PictureSize>,
     /// How the scene is rendered
     #[arg(long, default_value = METHODS[0].name, value_parser = methods())]
-    method: String,
+    pub(super) method: String,
     /// Set a key of the scene: -D shell.thickness=0.2; may be given more than once
     #[arg(short = 'D', value_name = "KEY=VALUE")]
     define: Vec<String>,
     #[command(flatten)]
-    accuracy: accuracy::Arguments,
+    pub(super) accuracy: accuracy::Arguments,
     /// The device: its number in `mesoshell devices`, a part of its name, or its UUID
     #[arg(long)]
-    device: Option<DeviceChoice>,
+    pub(super) device: Option<DeviceChoice>,
     /// Let the Vulkan validation layers watch; what they find is an error
     #[arg(long)]
-    validate: bool,
+    pub(super) validate: bool,
+}
+
+impl Arguments {
+    /// What is laid over the scene.
+    pub(super) fn overrides(&self) -> Vec<String> {
+        let view = self.camera.iter().map(|name| format!("view={name:?}"));
+        self.define.iter().cloned().chain(view).collect()
+    }
+
+    /// Pixels across and down, instead of the scene's.
+    pub(super) fn pixels(&self) -> Option<[u32; 2]> {
+        self.size.map(|PictureSize(size)| size.map(|side| side.0))
+    }
+}
+
+/// Whatever the validation layers found is an error.
+pub(super) fn check_messages(messages: Option<&Messages>) -> Result<()> {
+    let messages = messages.map_or_else(Vec::new, Messages::all);
+    if messages.is_empty() {
+        return Ok(());
+    }
+    Err(Error::Device {
+        message: format!("the validation layers object:\n{}", messages.join("\n")),
+        help: None,
+    })
 }
 
 /// What is printed with `--json`.
@@ -66,6 +102,9 @@ struct Rendered {
 /// # Errors
 /// Whatever stands between the scene and its picture.
 pub fn run(arguments: Arguments, talk: Talk) -> Result<ExitCode> {
+    if frames::are_wanted(&arguments) {
+        return frames::run(&arguments, talk);
+    }
     let interrupt = Interrupt::default();
     listen(&interrupt);
     let progress: Arc<dyn Progress> = Arc::new(Line::new(talk));
@@ -106,10 +145,10 @@ fn render(arguments: &Arguments, progress: &Arc<dyn Progress>, interrupt: &Inter
     watch.lap("open");
     let mut stages = watch.finish();
 
-    let size = arguments.size.map(|PictureSize(size)| size.map(|side| side.0));
+    let size = arguments.pixels();
     let admit = |sizes: &Sizes| method.admit(&Sizes { picture: size.unwrap_or(sizes.picture), ..*sizes });
     let Loaded { scene: mut loaded, backdrop, stages: load } =
-        scene::load_if(scene, &arguments.define, progress.as_ref(), &admit)?;
+        scene::load_if(scene, &arguments.overrides(), progress.as_ref(), &admit)?;
     stages.extend(load);
     [loaded.view.width, loaded.view.height] = size.unwrap_or([loaded.view.width, loaded.view.height]);
     let view = loaded.view;
@@ -130,13 +169,7 @@ fn render(arguments: &Arguments, progress: &Arc<dyn Progress>, interrupt: &Inter
     let mut frame = method.render(&view)?;
     frame.report.warnings.extend(warning);
     drop(method);
-    let messages = messages.as_ref().map_or_else(Vec::new, Messages::all);
-    if !messages.is_empty() {
-        return Err(Error::Device {
-            message: format!("the validation layers object:\n{}", messages.join("\n")),
-            help: None,
-        });
-    }
+    check_messages(messages.as_ref())?;
 
     let mut watch = Stopwatch::start();
     let accuracy = choice.map(|choice| choice.accuracy(&loaded, &frame.image, &setup)).transpose()?;

@@ -4,16 +4,18 @@
 //! under that name. Sizes that a file claims are checked against its length before memory is asked for.
 
 mod exr_header;
+mod mark;
 mod picture;
 
 use std::fs::File;
-use std::io::{BufReader, BufWriter, Write};
+use std::io::{BufReader, Write};
 use std::path::Path;
 
-use image::codecs::openexr::{OpenExrDecoder, OpenExrEncoder};
+use image::codecs::openexr::OpenExrDecoder;
 use image::codecs::png::{PngDecoder, PngEncoder};
 use image::{DynamicImage, ExtendedColorType, ImageDecoder, ImageEncoder, ImageError, Limits};
 
+pub use mark::mark;
 pub use picture::{is_picture, read_picture};
 
 use super::srgb::{linear_from_srgb, srgb_from_linear};
@@ -64,23 +66,29 @@ pub fn check_writable(path: impl AsRef<Path>) -> Result<()> {
 /// [`Error::Usage`] for an unknown extension, [`Error::Output`] when the file cannot be written, or when
 /// an image with values that are not numbers is to become a PNG.
 pub fn write(path: impl AsRef<Path>, image: &Image, backdrop: &Backdrop) -> Result<()> {
-    let path = path.as_ref();
+    write_marked(path.as_ref(), image, backdrop, None)
+}
+
+/// Writes an image as [`write()`] does, with a [`mark`] in the file.
+///
+/// # Errors
+/// As [`write()`].
+pub fn write_marked(path: &Path, image: &Image, backdrop: &Backdrop, mark: Option<&str>) -> Result<()> {
     let format = Format::of(path)?;
-    let mut file = output::file_beside(path)?;
-    let mut writer = BufWriter::new(file.as_file_mut());
+    let mut bytes = Vec::new();
     let encoded = match format {
         Format::Png => {
             check_numbers(path, image)?;
-            write_png(&mut writer, image, backdrop)
+            write_png(&mut bytes, image, backdrop).map_err(|error| error.to_string())
         }
-        Format::Exr => {
-            let (bytes, kind) = (bytemuck::cast_slice(&image.rgba), ExtendedColorType::Rgba32F);
-            OpenExrEncoder::new(&mut writer).write_image(bytes, image.width, image.height, kind)
-        }
+        Format::Exr => mark::write_exr(&mut bytes, image, mark),
     };
     encoded.map_err(|error| output::error(path, format!("cannot be encoded: {error}")))?;
-    writer.flush().map_err(|error| output::unwritable(path, &error))?;
-    drop(writer);
+    if let (Format::Png, Some(mark)) = (format, mark) {
+        bytes = mark::in_png(bytes, mark);
+    }
+    let mut file = output::file_beside(path)?;
+    file.as_file_mut().write_all(&bytes).map_err(|error| output::unwritable(path, &error))?;
     output::keep(file, path)
 }
 
@@ -167,6 +175,18 @@ pub(crate) fn write_png(writer: impl Write, image: &Image, backdrop: &Backdrop) 
         let bytes: Vec<u8> = developed.flat_map(|[r, g, b, _]| [r, g, b].map(srgb_byte)).collect();
         encoder.write_image(&bytes, width, height, ExtendedColorType::Rgb8)
     }
+}
+
+/// Red, green and blue of every pixel, sRGB of 8 bits, as a PNG shows them; laid on black where the backdrop is none.
+///
+/// # Errors
+/// [`Error::Output`] where a value is not a number.
+pub fn opaque_srgb(image: &Image, backdrop: &Backdrop) -> Result<Vec<u8>> {
+    check_numbers(Path::new("the frame"), image)?;
+    let byte = |x: f32| (255.0 * srgb_from_linear(x.clamp(0.0, 1.0)).clamp(0.0, 1.0)).round() as u8;
+    let develop = backdrop.develop(image.width, image.height);
+    let developed = image.rgba.iter().enumerate().map(|(index, &pixel)| develop(index, pixel));
+    Ok(developed.flat_map(|[r, g, b, _]| [r, g, b].map(byte)).collect())
 }
 
 fn premultiplied_from_srgb([r, g, b, a]: [f32; 4]) -> [f32; 4] {

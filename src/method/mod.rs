@@ -53,6 +53,9 @@ pub trait Opened {
     /// [`Error::Device`](crate::Error::Device) and [`Error::OutOfMemory`](crate::Error::OutOfMemory).
     fn admit(&self, sizes: &Sizes) -> Result<()>;
 
+    /// The device's name and its driver's; `"cpu"` where there is none.
+    fn device(&self) -> String;
+
     /// Takes a scene to the method: uploads it, builds what does not depend on the view.
     ///
     /// # Errors

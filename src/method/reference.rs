@@ -31,6 +31,10 @@ impl super::Opened for Opened {
         Ok(())
     }
 
+    fn device(&self) -> String {
+        "cpu".into()
+    }
+
     fn prepare(self: Box<Self>, scene: Arc<Scene>) -> Result<Box<dyn Method>> {
         Ok(Box::new(Reference { scene, opened: *self }))
     }

@@ -3,9 +3,8 @@
 use std::path::Path;
 
 use super::file::SceneFile;
-use super::parts::{Checked, Parts};
 use super::text::Text;
-use super::{Scene, Sizes};
+use super::{Scene, Sequence, Sizes};
 use crate::frame::{Backdrop, Stage};
 use crate::progress::{Progress, Silent};
 use crate::{Error, Result, input};
@@ -21,7 +20,7 @@ pub struct Loaded {
     pub stages: Vec<Stage>,
 }
 
-/// Loads a scene file with overrides laid over it, each `dotted.key=value`.
+/// Loads a scene file with overrides laid over it, each `dotted.key=value`: the first frame, where there are several.
 ///
 /// # Errors
 /// [`Error::Input`] for a file that cannot be read, [`Error::Text`] for a scene that cannot be, with the spot,
@@ -41,7 +40,7 @@ pub fn load_if(
     progress: &dyn Progress,
     admit: &dyn Fn(&Sizes) -> Result<()>,
 ) -> Result<Loaded> {
-    build(&text(path, overrides)?, path.parent().unwrap_or(Path::new("")), progress, admit)
+    build(text(path, overrides)?, path.parent().unwrap_or(Path::new("")), progress, admit)
 }
 
 /// The text of a scene file.
@@ -64,18 +63,16 @@ pub(super) fn read(text: &Text) -> Result<SceneFile> {
 /// # Errors
 /// As [`load`].
 pub fn parse(name: &str, text: &str, base_dir: &Path) -> Result<Loaded> {
-    build(&Text::new(name, text.to_owned(), &[])?, base_dir, &Silent, &|_| Ok(()))
+    build(Text::new(name, text.to_owned(), &[])?, base_dir, &Silent, &|_| Ok(()))
 }
 
 fn build(
-    text: &Text,
+    text: Text,
     base_dir: &Path,
     progress: &dyn Progress,
     admit: &dyn Fn(&Sizes) -> Result<()>,
 ) -> Result<Loaded> {
-    let file = read(text)?;
-    let checked = Checked::new(text, &file, base_dir)?;
-    Parts::default().build(&checked, None, progress, admit)
+    Sequence::of(text, base_dir)?.at(1, progress, admit)
 }
 
 #[cfg(test)]
@@ -112,7 +109,7 @@ recipe = "fog.toml"
 
     fn loaded(overrides: &[&str]) -> Result<Loaded> {
         let overrides: Vec<_> = overrides.iter().map(|&text| text.to_owned()).collect();
-        build(&Text::new("scene.toml", SCENE.to_owned(), &overrides)?, folder().path(), &Silent, &|_| Ok(()))
+        build(Text::new("scene.toml", SCENE.to_owned(), &overrides)?, folder().path(), &Silent, &|_| Ok(()))
     }
 
     #[test]
@@ -358,7 +355,7 @@ recipe = "fog.toml"
             assert_eq!(*sizes, Sizes { picture: [512, 512], volume: [2048, 512, 128] });
             Err(Error::Interrupted)
         };
-        assert!(matches!(build(&text, folder.path(), &Silent, &refuse), Err(Error::Interrupted)));
+        assert!(matches!(build(text, folder.path(), &Silent, &refuse), Err(Error::Interrupted)));
     }
 
     #[test]
@@ -366,7 +363,7 @@ recipe = "fog.toml"
         let folder = folder();
         let told = |text: &str, overrides: &[String], parts: &[&str]| {
             let text = Text::new("scene.toml", text.to_owned(), overrides).unwrap();
-            let error = build(&text, folder.path(), &Silent, &|_| Ok(())).map(drop).unwrap_err();
+            let error = build(text, folder.path(), &Silent, &|_| Ok(())).map(drop).unwrap_err();
             let report = format!("{:?}", miette::Report::new_boxed(Box::new(error)));
             for part in parts.iter().chain(&["texels along u", "shell.uv_scale", "texture coordinates"]) {
                 assert!(report.contains(part), "{report}");
@@ -384,7 +381,7 @@ recipe = "fog.toml"
     #[test]
     fn a_mistake_in_the_file_is_not_blamed_on_an_override() {
         let text = Text::new("scene.toml", SCENE.replace("0.1", "0"), &["mesh.rings=9".to_owned()]).unwrap();
-        assert!(matches!(build(&text, folder().path(), &Silent, &|_| Ok(())), Err(Error::Text { .. })));
+        assert!(matches!(build(text, folder().path(), &Silent, &|_| Ok(())), Err(Error::Text { .. })));
     }
 
     #[test]

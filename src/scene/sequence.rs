@@ -44,7 +44,8 @@ impl Sequence {
         Self::of(load::text(path, overrides)?, path.parent().unwrap_or(Path::new("")))
     }
 
-    fn of(text: Text, base_dir: &Path) -> Result<Self> {
+    /// Of a text whose paths start in `base_dir`.
+    pub(super) fn of(text: Text, base_dir: &Path) -> Result<Self> {
         let file: SceneFile = load::read(&text)?;
         let timeline = Timeline::of(file.timeline.as_ref());
         let tracks = Track::all(&text, &file, &timeline)?;

@@ -56,6 +56,18 @@ pub(super) fn sizes(path: &Path, file: &mut (impl Read + Seek)) -> Result<Vec<[u
     Ok(sizes)
 }
 
+/// The value of an attribute in the first bytes of an EXR file.
+pub(super) fn attribute<'a>(head: &'a [u8], wanted: &[u8]) -> Option<&'a [u8]> {
+    // The magic number, and the version with its flags.
+    let mut bytes = head.get(8..)?;
+    loop {
+        let (name, value) = next_attribute(&mut bytes)??;
+        if name == wanted {
+            return Some(value);
+        }
+    }
+}
+
 /// The next attribute's name and value; `Some(None)` at the end of the header, `None` where it is cut off.
 fn next_attribute<'a>(bytes: &mut &'a [u8]) -> Option<Option<(&'a [u8], &'a [u8])>> {
     let name = take_string(bytes)?;

@@ -154,6 +154,11 @@ impl super::Opened for Opened {
         self.gpu.check_sizes(sizes.picture, sizes.volume)
     }
 
+    fn device(&self) -> String {
+        let info = self.gpu.info();
+        format!("{}, {}", info.name, info.driver)
+    }
+
     fn prepare(self: Box<Self>, scene: Arc<Scene>) -> Result<Box<dyn Method>> {
         let Self { gpu, progress, interrupt } = *self;
         let texels = longest_span(&scene)?;
