@@ -29,6 +29,13 @@ name = "sun"
 direction = [-1, -1, -0.5]
 shadow = true
 
+[[deform]]
+name = "twist"
+kind = "twist"
+axis = [1, 0, 0]
+range = [-1, 1]
+angle = 0
+
 [timeline]
 frames = 6
 rate = 3
@@ -36,7 +43,7 @@ loop = true
 "#;
 
 /// A key, and its values at the start and after a second, of two.
-const MOVES: [(&str, &str, &str); 8] = [
+const MOVES: [(&str, &str, &str); 10] = [
     ("camera.orbit", "0", "90"),
     ("shell.thickness", "0.3", "0.2"),
     ("shell.uv_offset", "[0, 0]", "[0.5, 0.25]"),
@@ -45,6 +52,8 @@ const MOVES: [(&str, &str, &str); 8] = [
     ("light.sun.direction", "[-1, -1, -0.5]", "[0.5, -1, -0.5]"),
     ("volume.vary.coverage", "0.6", "0.3"),
     ("shading.diffuse", "1", "0.5"),
+    ("deform.twist.angle", "0", "60"),
+    ("mesh.transform.rotate", "[0, 0, 0]", "[30, 10, 0]"),
 ];
 
 struct Animation(tempfile::TempDir);
@@ -133,6 +142,7 @@ fn what_does_not_move_is_shared() {
     assert_eq!(shared("shell.uv_offset"), ["topology", "vertices", "volume", "directions", "solids"]);
     assert_eq!(shared("shell.thickness"), ["topology", "volume", "directions", "solids"]);
     assert_eq!(shared("mesh.minor_radius"), ["topology", "volume", "directions"]);
+    assert_eq!(shared("deform.twist.angle"), ["topology", "volume", "directions"]);
     assert_eq!(shared("volume.vary.coverage"), ["topology", "vertices", "shell", "solids"]);
 }
 

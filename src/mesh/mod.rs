@@ -1,6 +1,8 @@
 //! The base mesh: triangles with positions, normals and texture coordinates.
 
+pub mod deform;
 pub mod figure;
+pub mod flow;
 pub mod generate;
 pub mod info;
 pub mod model;

@@ -15,6 +15,7 @@ use super::Background;
 use super::Model;
 use super::PIXEL_FOOTPRINT;
 use super::camera::DEFAULT_FOV_DEGREES;
+use super::motion::{DeformSection, TransformSection};
 use super::shading::DEFAULT_SHADOW_SIZE;
 use super::timeline::Ease;
 use crate::mesh::generate::Generator;
@@ -31,6 +32,9 @@ use crate::volume::{Filter, TransferFunction};
 pub struct SceneFile {
     /// The base mesh; the span is the section's.
     pub mesh: Spanned<MeshSection>,
+    /// What is done to it, in order; the spans are those of the sections.
+    #[serde(default)]
+    pub deform: Vec<Spanned<DeformSection>>,
     /// The shell around it.
     pub shell: ShellSection,
     /// What fills the shell; the span is the section's.
@@ -135,6 +139,8 @@ pub struct MeshSection {
     pub file: Option<PathBuf>,
     /// How texture coordinates are made, in place of those of the file.
     pub projection: Option<Projection>,
+    /// Where it is.
+    pub transform: Option<TransformSection>,
 }
 
 /// `[shell]`.
@@ -146,6 +152,9 @@ pub struct ShellSection {
     /// Rounds of averaging of the extrusion directions.
     #[serde(default = "no_rounds")]
     pub smoothing: Rounds,
+    /// Whether it gives way where it would fold.
+    #[serde(default)]
+    pub limit: Limit,
     /// Repeats of the texture along u and v for each unit of the mesh's texture coordinates.
     #[serde(default = "scale_of_one")]
     pub uv_scale: Exactly<2, Finite>,
@@ -155,6 +164,17 @@ pub struct ShellSection {
     /// Added after the rotation.
     #[serde(default = "no_offset")]
     pub uv_offset: Exactly<2, Finite>,
+}
+
+/// What becomes of a shell that is too thick for its mesh.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Limit {
+    /// It folds, with a warning.
+    #[default]
+    None,
+    /// It is made thinner there.
+    Safe,
 }
 
 /// `[volume]`: a recipe or a file.
@@ -447,8 +467,8 @@ recipe = "fog.toml"
                 found += 1;
             }
         }
-        assert_eq!(found, 5 + 12 + 6 + 3 + 3 + 10 + 2 + 3);
-        for (section, count) in [("light", 6), ("solid", 6), ("track", 4)] {
+        assert_eq!(found, 6 + 12 + 6 + 3 + 3 + 10 + 2 + 3);
+        for (section, count) in [("light", 6), ("solid", 6), ("track", 4), ("deform", 14)] {
             let text = Text::new("keys", format!("{SCENE}[[{section}]]\nunknown_key = 1"), &[]).unwrap();
             let message = text.parse::<SceneFile>(("mesh", "generator")).unwrap_err().to_string();
             let (_, documented) = DOCUMENTATION.split_once(&format!("\n## `[[{section}]]`")).unwrap();

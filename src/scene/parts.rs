@@ -9,10 +9,11 @@ use glam::DVec2;
 use toml::Spanned;
 
 use super::file::{
-    BaseSection, HazeSection, ImageSection, MeshSection, Plan, SceneFile, SolidSection, VolumeSection,
+    BaseSection, HazeSection, ImageSection, Limit, MeshSection, Plan, SceneFile, SolidSection, VolumeSection,
 };
 use super::lighting::Lighting;
 use super::load::Loaded;
+use super::motion::Motion;
 use super::numbered::Moment;
 use super::solids::Solids;
 use super::source::{MeshSource, VolumeSource};
@@ -131,7 +132,9 @@ struct Ahead {
 /// The parts of the last scene.
 #[derive(Default)]
 pub(super) struct Parts {
+    /// Without its transform.
     mesh: Kept<MeshSection, Arc<Mesh>>,
+    moved: Kept<(Same<Mesh>, Motion), Arc<Mesh>>,
     shell: Kept<(Same<Mesh>, ShellOptions), Arc<Shell>>,
     /// The shell before that, whose memory the next may have.
     spare: Option<Arc<Shell>>,
@@ -151,6 +154,7 @@ pub(super) struct Checked<'a> {
     base_dir: &'a Path,
     camera: Option<Camera>,
     mesh: MeshSource<'a>,
+    motion: Motion,
     volume: VolumeSource,
     lighting: Option<Lighting<'a>>,
 }
@@ -169,6 +173,7 @@ impl<'a> Checked<'a> {
         Ok(Self {
             camera: sight::camera(text, file)?,
             mesh: MeshSource::of(text, &file.mesh)?,
+            motion: Motion::of(text, file.mesh.get_ref().transform.as_ref(), &file.deform)?,
             volume: VolumeSource::of(text, &file.volume, base_dir, moment)?,
             lighting: Lighting::of(text, file, base_dir)?,
             text,
@@ -183,6 +188,7 @@ impl<'a> Checked<'a> {
             thickness: shell.thickness.0,
             thickness_scale: Vec::new(),
             smoothing_rounds: shell.smoothing.0,
+            limited: shell.limit == Limit::Safe,
             uv_scale: DVec2::from_array(shell.uv_scale.0.map(|x| x.0)),
             uv_rotation: shell.uv_rotation.0.to_radians(),
             uv_offset: DVec2::from_array(shell.uv_offset.0.map(|x| x.0)),
@@ -232,11 +238,21 @@ impl Parts {
         progress: &dyn Progress,
         stopwatch: &mut Stopwatch,
     ) -> Result<(Arc<Mesh>, Arc<Shell>)> {
-        let mesh = self.mesh.get(checked.file.mesh.get_ref().clone(), |_| {
+        let section = MeshSection { transform: None, ..checked.file.mesh.get_ref().clone() };
+        let mesh = self.mesh.get(section, |_| {
             progress.stage("loading the mesh");
             let mesh = checked.mesh.load(checked.base_dir)?;
             stopwatch.lap("load.mesh");
             Ok(Arc::new(mesh))
+        })?;
+        let mesh = self.moved.get((Same(mesh), checked.motion.clone()), |(Same(mesh), motion)| {
+            if motion.is_none() {
+                return Ok(mesh.clone());
+            }
+            let mut moved = Mesh::clone(mesh);
+            motion.apply(&mut moved);
+            stopwatch.lap("deform");
+            Ok(Arc::new(moved))
         })?;
         let before = self.shell.0.as_ref().map(|(_, shell)| shell.clone());
         let spare = &mut self.spare;

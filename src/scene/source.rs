@@ -45,14 +45,14 @@ impl<'a> MeshSource<'a> {
     /// [`Error::Text`](crate::Error::Text) with the spot.
     pub(super) fn of(text: &Text, section: &'a Spanned<MeshSection>) -> Result<Self> {
         match section.get_ref() {
-            MeshSection { generator: Some(generator), file: None, projection: None } => {
+            MeshSection { generator: Some(generator), file: None, projection: None, .. } => {
                 generator.check().map_err(|bad| {
                     let span = text.span_of("mesh", bad.key).unwrap_or(section.span());
                     text.error(span, format!("`{}` {}", bad.key, bad.message))
                 })?;
                 Ok(Self::Generator(generator))
             }
-            MeshSection { generator: None, file: Some(file), projection } => {
+            MeshSection { generator: None, file: Some(file), projection, .. } => {
                 Ok(Self::File(file, projection.as_ref()))
             }
             _ => Err(text.error(section.span(), "[mesh] needs either `generator` with its keys or `file`")),

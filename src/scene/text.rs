@@ -230,7 +230,7 @@ fn table_named<'a, 'b>(value: &'b mut Spanned<DeValue<'a>>, wanted: &str) -> Opt
 }
 
 /// Turns `[section] tag = "variant", field = 1` into `[section] tag = { variant = { field = 1 } }`, which is how
-/// serde expects an enum. (Its own `tag` attribute would forget where each value stands.)
+/// serde expects an enum; tables in the section are its own, not the variant's. (Its own `tag` attribute would forget where each value stands.)
 fn nest_variant(root: &mut DeTable<'_>, (section, tag): (&str, &str)) {
     let Some(DeValue::Table(fields)) = root.get_mut(section).map(Spanned::get_mut) else { return };
     if !matches!(fields.get(tag).map(Spanned::get_ref), Some(DeValue::String(_))) {
@@ -239,7 +239,9 @@ fn nest_variant(root: &mut DeTable<'_>, (section, tag): (&str, &str)) {
     let Some((key, selector)) = fields.remove_entry(tag) else { return };
     let span = selector.span();
     let DeValue::String(variant) = selector.into_inner() else { return };
-    let fields = Spanned::new(span.clone(), DeValue::Table(std::mem::take(fields)));
+    let (kept, of_variant) = std::mem::take(fields).into_iter().partition(|(_, value)| is_table(value));
+    *fields = kept;
+    let fields = Spanned::new(span.clone(), DeValue::Table(of_variant));
     let variant = DeTable::from_iter([(Spanned::new(span.clone(), variant), fields)]);
     let nested = (key, Spanned::new(span, DeValue::Table(variant)));
     if let Some(DeValue::Table(table)) = root.get_mut(section).map(Spanned::get_mut) {

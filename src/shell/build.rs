@@ -5,7 +5,7 @@ use std::sync::Arc;
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
-use super::{Cell, Health, Shell, ShellOptions, Topology, cell, extrude, health};
+use super::{Cell, Health, Shell, ShellOptions, Topology, cell, extrude, health, limit};
 use crate::mesh::Mesh;
 use crate::{Error, Result};
 
@@ -27,6 +27,7 @@ impl Shell {
             texture: Vec::new(),
             cells: Vec::new(),
             health: Health::default(),
+            limit: None,
         };
         shell.place(mesh, options);
         Ok(shell)
@@ -40,7 +41,8 @@ impl Shell {
     pub fn moved(&self, mesh: &Mesh, options: &ShellOptions, spare: Option<Self>) -> Result<Self> {
         let (texture, cells) = spare.map_or_else(Default::default, |spare| (spare.texture, spare.cells));
         let (topology, vertices) = (self.topology.clone(), self.vertices.clone());
-        let mut moved = Self { topology, vertices, texture, cells, health: Health::default() };
+        let health = Health::default();
+        let mut moved = Self { topology, vertices, texture, cells, health, limit: None };
         moved.rebuild(mesh, options)?;
         Ok(moved)
     }
@@ -69,6 +71,15 @@ impl Shell {
 
     fn place(&mut self, mesh: &Mesh, options: &ShellOptions) {
         let directions = extrude::directions(mesh, options);
+        let limited = options.limited.then(|| limit::factors(mesh, &self.topology, options, &directions));
+        let (factors, limit) = limited.flatten().unzip();
+        self.limit = limit;
+        let limited = factors.map(|factors| {
+            let scaled = |(id, factor)| factor * extrude::thickness_at(options, id) / options.thickness;
+            let thickness_scale = factors.into_iter().enumerate().map(scaled).collect();
+            ShellOptions { thickness_scale, ..options.clone() }
+        });
+        let options = limited.as_ref().unwrap_or(options);
         let outer = mesh.positions.iter().zip(&directions).enumerate();
         let outer = outer.map(|(id, (&x, &n))| x + extrude::thickness_at(options, id) * n);
         let vertices: Vec<DVec3> = mesh.positions.iter().copied().chain(outer).collect();

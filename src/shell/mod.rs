@@ -21,6 +21,7 @@ mod cell;
 mod extrude;
 mod frames;
 mod health;
+mod limit;
 mod topology;
 
 use std::sync::Arc;
@@ -78,6 +79,8 @@ pub struct ShellOptions {
     pub thickness_scale: Vec<f64>,
     /// Rounds of neighbourhood averaging applied to the extrusion directions.
     pub smoothing_rounds: u32,
+    /// Whether the shell is made thinner where it would fold.
+    pub limited: bool,
     /// Texture coordinates are `R (uv_scale * uv) + uv_offset`, modulo 1; R turns by `uv_rotation`.
     pub uv_scale: DVec2,
     /// Radians, from u towards v: see `uv_scale`.
@@ -126,6 +129,19 @@ pub struct Shell {
     pub cells: Vec<Cell>,
     /// Counted when the shell was built.
     pub health: Health,
+    /// Where it was made thinner than asked.
+    pub limit: Option<Limit>,
+}
+
+/// Where a shell gave way to the limit on its thickness: see [`ShellOptions::limited`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Limit {
+    /// How many positions of the mesh are below their full thickness.
+    pub vertices: u64,
+    /// The least factor on a thickness.
+    pub least: f64,
+    /// The mesh's position that has it.
+    pub at: DVec3,
 }
 
 /// The corners of face `k`, counter-clockwise seen from outside a tetrahedron of positive volume.
@@ -138,6 +154,7 @@ impl ShellOptions {
             thickness,
             thickness_scale: Vec::new(),
             smoothing_rounds: 0,
+            limited: false,
             uv_scale: DVec2::ONE,
             uv_rotation: 0.0,
             uv_offset: DVec2::ZERO,

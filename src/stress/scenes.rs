@@ -80,6 +80,7 @@ pub fn connected(vertices: Vec<DVec3>, tetrahedra: Vec<[u32; 4]>, texture: &[DVe
         vertices: Arc::new(vertices),
         texture: texture.iter().map(|point| [*point; 4]).collect(),
         cells: corners.iter().map(cell).collect(),
+        limit: None,
     }
 }
 

@@ -31,7 +31,7 @@ use crate::gpu::{
 use crate::order::{Sorted, Sorter};
 use crate::progress::{Interrupt, Progress};
 use crate::scene::{March, Model, Scene, Sizes, View, span};
-use crate::shell;
+use crate::shell::{self, Limit};
 use crate::volume::{Pyramid, Quantity};
 use crate::{Error, Result};
 
@@ -595,9 +595,17 @@ impl Shell {
             }
             _ => {}
         }
+        if let Some(Limit { vertices, least, at }) = self.scene.shell.limit {
+            report.counts.insert("vertices_limited".to_owned(), vertices);
+            let [x, y, z] = at.to_array();
+            report.skipped.push(format!(
+                "the shell is thinner than asked at {vertices} vertices, so that it does not fold: {least:.3} of it at \
+                 ({x:.4}, {y:.4}, {z:.4})"
+            ));
+        }
         if health.inverted > 0 {
             report.warnings.push(format!(
-                "{} of {} tetrahedra are inverted: the shell folds; make it thinner or smooth its directions",
+                "{} of {} tetrahedra are inverted: the shell folds; make it thinner, smooth its directions, or let it give way by shell.limit = \"safe\"",
                 health.inverted, health.tetrahedra
             ));
         }
