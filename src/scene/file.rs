@@ -415,7 +415,8 @@ recipe = "fog.toml"
         Text::new("docs", scene, &[]).unwrap().parse::<SceneFile>(("mesh", "generator")).unwrap();
         let lit = blocks.find(|block| block.contains("[shading]")).unwrap();
         let solid = blocks.find(|block| block.contains("[[solid]]")).unwrap();
-        for block in [lit, solid] {
+        let moving = blocks.find(|block| block.contains("[timeline]")).unwrap();
+        for block in [lit, solid, moving] {
             let text = Text::new("docs", format!("{SCENE}{block}"), &[]).unwrap();
             text.parse::<SceneFile>(("mesh", "generator")).unwrap();
         }
@@ -432,7 +433,7 @@ recipe = "fog.toml"
     #[test]
     fn every_key_is_documented() {
         let mut found = 0;
-        for section in ["shell", "volume", "camera", "image", "march", "shading", "base"] {
+        for section in ["shell", "volume", "camera", "image", "march", "shading", "base", "timeline"] {
             let (_, documented) = DOCUMENTATION.split_once(&format!("\n## `[{section}]`")).unwrap();
             let documented = documented.split("\n## ").next().unwrap();
             for key in keys(section) {
@@ -440,8 +441,8 @@ recipe = "fog.toml"
                 found += 1;
             }
         }
-        assert_eq!(found, 5 + 10 + 6 + 3 + 3 + 10 + 2);
-        for (section, count) in [("light", 6), ("solid", 6)] {
+        assert_eq!(found, 5 + 10 + 6 + 3 + 3 + 10 + 2 + 3);
+        for (section, count) in [("light", 6), ("solid", 6), ("track", 4)] {
             let text = Text::new("keys", format!("{SCENE}[[{section}]]\nunknown_key = 1"), &[]).unwrap();
             let message = text.parse::<SceneFile>(("mesh", "generator")).unwrap_err().to_string();
             let (_, documented) = DOCUMENTATION.split_once(&format!("\n## `[[{section}]]`")).unwrap();

@@ -237,3 +237,86 @@ fn numbers(value: &Value) -> Vec<f64> {
         one => number(one).into_iter().collect(),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::load;
+    use super::*;
+
+    const SCENE: &str = "mesh.generator = 'torus'\nshell.thickness = 1\nvolume.recipe = 'fog.toml'\n";
+
+    /// The text laid over by a track with these keys, in a timeline of four seconds that loops.
+    fn track(keys: &str) -> Result<Track> {
+        let timeline = "timeline = { frames = 8, rate = 2, loop = true }";
+        let text = format!("{SCENE}{timeline}\n[[track]]\nkey = 'shell.uv_offset'\n{keys}\n");
+        let text = Text::new("scene", text, &[])?;
+        let file = load::read(&text)?;
+        Ok(Track::all(&text, &file, &Timeline::of(file.timeline.as_ref()))?.remove(0))
+    }
+
+    /// The first number of a track's values.
+    fn values(keys: &str, times: &[f64]) -> Vec<f64> {
+        let track = track(keys).unwrap_or_else(|error| panic!("{error}"));
+        let Values::Numbers(values, _) = &track.values else { panic!("no numbers") };
+        times.iter().map(|&time| track.interpolated(values, time)[0]).collect()
+    }
+
+    fn assert_near(found: &[f64], expected: &[f64]) {
+        // A few roundings of numbers up to 10.
+        let near = found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-13);
+        assert!(near && found.len() == expected.len(), "{found:?}, expected {expected:?}");
+    }
+
+    #[test]
+    fn keys_are_met_and_ends_hold() {
+        for ease in ["linear", "smooth", "spline"] {
+            let keys = format!("at = [1, 2, 4]\nvalues = [3, 5, -1]\nease = '{ease}'");
+            assert_near(&values(&keys, &[-1.0, 1.0, 2.0, 4.0, 9.0]), &[3.0, 3.0, 5.0, -1.0, -1.0]);
+        }
+    }
+
+    #[test]
+    fn ways_between_keys() {
+        let keys = |ease: &str| format!("at = [0, 2]\nvalues = [0, 8]\nease = '{ease}'");
+        assert_near(&values(&keys("linear"), &[0.5, 1.0]), &[2.0, 4.0]);
+        // 8 (3 / 16 - 2 / 64).
+        assert_near(&values(&keys("smooth"), &[0.5, 1.0]), &[1.25, 4.0]);
+        assert_near(&values(&keys("spline"), &[0.5, 1.0]), &[2.0, 4.0]);
+        // A spline is exact on a parabola where keys are evenly spaced: slopes are central differences.
+        let squares = "at = [0, 1, 2, 3]\nvalues = [0, 1, 4, 9]\nease = 'spline'";
+        assert_near(&values(squares, &[1.5, 1.25]), &[2.25, 1.5625]);
+    }
+
+    #[test]
+    fn a_spline_goes_on_round_the_seam_of_a_loop() {
+        let slope = |keys: &str, time: f64| {
+            let [a, b] = values(keys, &[time, time + 1e-6])[..] else { unreachable!() };
+            (b - a) / 1e-6
+        };
+        // Of period four: what comes before 0 is what comes before 4.
+        let keys = "at = [0, 1, 3, 4]\nvalues = [0, 1, -1, 0]\nease = 'spline'";
+        // (1 - -1) / 2 on both sides; second derivatives below 10 leave 1e-5.
+        assert!((slope(keys, 0.0) - 1.0).abs() < 2e-5 && (slope(keys, 4.0 - 1e-6) - 1.0).abs() < 2e-5);
+        // A track that is shorter than the loop does not go round it.
+        let keys = "at = [0, 1, 2, 3]\nvalues = [0, 1, -1, 0]\nease = 'spline'";
+        assert!((slope(keys, 0.0) - 2.0).abs() > 0.5, "{}", slope(keys, 0.0));
+    }
+
+    #[test]
+    fn steps_hold_until_the_next_key() {
+        let track = track("at = [0, 1]\nvalues = ['a', 'b']\nease = 'step'").unwrap();
+        let laid = |time: f64| format!("{:?}", track.at(time).unwrap());
+        for (time, value) in
+            [(-1.0, "\\\"a\\\""), (0.99, "\\\"a\\\""), (1.0, "\\\"b\\\""), (9.0, "\\\"b\\\"")]
+        {
+            assert!(laid(time).contains(&format!("={value}")), "{time}: {}", laid(time));
+        }
+    }
+
+    #[test]
+    fn lists_go_number_by_number() {
+        let track = track("at = [0, 2]\nvalues = [[0, 1], [1, 0.5]]").unwrap();
+        let laid = format!("{:?}", track.at(0.5).unwrap());
+        assert!(laid.contains("shell.uv_offset=[0.25, 0.875]"), "{laid}");
+    }
+}

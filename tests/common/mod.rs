@@ -27,6 +27,11 @@ impl Watched {
         Self { method: Some(method), messages }
     }
 
+    pub fn update(&mut self, scene: &Arc<Scene>) {
+        let method = self.method.as_mut().expect("present until dropped");
+        method.update(scene.clone()).unwrap_or_else(|error| panic!("{error}"));
+    }
+
     pub fn render(&mut self, view: &View) -> Frame {
         let method = self.method.as_mut().expect("present until dropped");
         method.render(view).unwrap_or_else(|error| panic!("{error}"))

@@ -99,7 +99,7 @@ fn no_ray_passes_between_the_triangles_of_a_closed_mesh() {
                     let mut view = view(eye, target, 1);
                     view.camera.up = DVec3::new(0.3, 0.8, 0.4);
                     let mut scene = scene(flat_shell(), level_zero(layers(&[grey(0.0)])), view);
-                    scene.solids = [Solid { mesh: mesh.clone().into(), ..solid.clone() }].into();
+                    scene.solids = [Solid { mesh: mesh.clone(), ..solid.clone() }].into();
                     misses += u32::from(Reference::new(&scene, &view).pixel(0, 0).rgba != [1.0; 4]);
                 }
             }

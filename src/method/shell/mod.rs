@@ -319,6 +319,7 @@ impl Method for Shell {
         let same_shell = Arc::ptr_eq(&before.shell, &scene.shell);
         let same_volume = Arc::ptr_eq(&before.volume, &scene.volume);
         let same_solids = Arc::ptr_eq(&before.solids, &scene.solids);
+        let model = |scene: &Scene| scene.shading.as_ref().map(|shading| shading.model);
         let size = scene.volume.levels[0].size;
         let mut kept = Vec::new();
         let texels = if same_shell && size == before.volume.levels[0].size {
@@ -382,7 +383,7 @@ impl Method for Shell {
             kept.push("the shell's topology is kept: the triangles are the same".to_owned());
         }
         if let Some(last) = &mut self.last
-            && (!same_directions
+            && (model(before) != model(&scene)
                 || before.medium.lod_footprint != scene.medium.lod_footprint
                 || size != before.volume.levels[0].size
                 || scene.volume.levels.len() != before.volume.levels.len())
