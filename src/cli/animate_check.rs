@@ -5,6 +5,7 @@ use std::process::ExitCode;
 use std::sync::Arc;
 
 use clap::Args;
+use mesoshell::film::FrameRange;
 use mesoshell::frame::{Backdrop, file};
 use mesoshell::gpu::DeviceChoice;
 use mesoshell::instrument::{self, FrameResults, Options, Outcome, Results, page};
@@ -23,9 +24,9 @@ use super::render::size;
 pub struct Arguments {
     /// The scene file; docs/animation-check.md says what is measured
     scene: PathBuf,
-    /// The frames, as 1-120; by default all of the timeline
-    #[arg(long, value_name = "RANGE", value_parser = range)]
-    frames: Option<Range>,
+    /// Which frames: 1-120, 1-100x5, 3,5-10; by default all of the timeline
+    #[arg(long, value_name = "RANGE", default_value = "all")]
+    frames: FrameRange,
     /// Folder of index.html and results.json
     #[arg(long, short, value_name = "FOLDER")]
     output: Option<PathBuf>,
@@ -68,8 +69,7 @@ fn check(arguments: &Arguments, progress: &Arc<dyn Progress>, interrupt: &Interr
     let mut sequence = Sequence::open(&arguments.scene, &arguments.define)?;
     let device = arguments.device.clone().unwrap_or_default();
     let setup = Setup { device: &device, validation: None, progress, interrupt };
-    let frames: Vec<u32> =
-        arguments.frames.map_or_else(Vec::new, |Range(first, last)| (first..=last).collect());
+    let frames = arguments.frames.of(sequence.timeline())?;
     let options = Options {
         scene: &arguments.scene,
         frames: &frames,
@@ -157,18 +157,4 @@ fn faults(frame: &FrameResults) -> String {
         text += &format!("  popping: pixel {x}, {y}\n");
     }
     text
-}
-
-/// From the first to the last of these frames.
-#[derive(Clone, Copy)]
-struct Range(u32, u32);
-
-fn range(text: &str) -> std::result::Result<Range, String> {
-    let (first, last) = text.split_once('-').unwrap_or((text, text));
-    let number =
-        |text: &str| text.parse::<u32>().map_err(|_| format!("`{text}` is no frame, expected such as 1-120"));
-    match (number(first)?, number(last)?) {
-        (first, last) if 1 <= first && first <= last => Ok(Range(first, last)),
-        _ => Err("expected the first frame, 1 or later, and the last".to_owned()),
-    }
 }

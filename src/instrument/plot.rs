@@ -24,9 +24,9 @@ pub fn svg(title: &str, frames: &[u32], curves: &[Curve]) -> String {
     let (first, last) = (f64::from(frames[0]), f64::from(frames[frames.len() - 1]));
     let drawn = || curves.iter().flat_map(|curve| &curve.values).flatten().copied().filter(|v| v.is_finite());
     let (low, high) = drawn().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
-    let (low, high) = if low <= high { (low, high) } else { (0.0, 1.0) };
-    // Flat curves get some room, and counts start at none.
-    let room = (0.05 * (high - low)).max(1e-3 * high.abs().max(1e-3));
+    // Where there is nothing there is an axis from 0 to 1; flat curves get some room, and counts start at 0.
+    let (low, high) = if low <= high && (low, high) != (0.0, 0.0) { (low, high) } else { (0.0, 1.0) };
+    let room = (0.05 * (high - low)).max(1e-3 * high.abs());
     let (low, high) = (if low == 0.0 { 0.0 } else { low - room }, high + room);
     let x = |frame: u32| {
         LEFT + (RIGHT - LEFT) * if first < last { (f64::from(frame) - first) / (last - first) } else { 0.5 }

@@ -261,8 +261,10 @@ mod tests {
         image
     }
 
+    /// A part of the ring that fills the picture.
     fn view(shell: &Shell) -> View {
-        View { camera: Camera::framing(&shell.vertices), width: SIDE, height: SIDE, depth: false }
+        let camera = Camera { target: DVec3::X, fov_y: 0.1, ..Camera::framing(&shell.vertices) };
+        View { camera, width: SIDE, height: SIDE, depth: false }
     }
 
     #[test]

@@ -12,9 +12,9 @@ use super::results::{FrameResults, OrderResults, Results};
 use super::stretch::{Stretch, deformations};
 use crate::bench::report::picture::{data_uri, thumbnail};
 use crate::frame::{Backdrop, Frame, Image};
-use crate::method::{Method, Setup, shell};
+use crate::method::{Setup, shell};
 use crate::order::{Sorter, check_pixels};
-use crate::scene::{Loaded, Scene, Sequence, Sizes};
+use crate::scene::{Scene, Sequence, Sizes};
 use crate::shell::Shell;
 use crate::{Error, Result};
 
@@ -22,7 +22,7 @@ use crate::{Error, Result};
 pub struct Options<'a> {
     /// The scene file, as the results are to call it.
     pub scene: &'a Path,
-    /// Numbers of frames, ascending; empty for all.
+    /// Numbers of frames, ascending, at least one, all in the timeline.
     pub frames: &'a [u32],
     /// Width and height in pixels, instead of the scene's.
     pub size: Option<[u32; 2]>,
@@ -81,7 +81,6 @@ impl Past {
 /// What is gathered on the way.
 struct Walk<'a> {
     options: &'a Options<'a>,
-    setup: &'a Setup<'a>,
     rest: Arc<Shell>,
     sorter: Sorter,
     worst: Vec<Worst>,
@@ -92,18 +91,11 @@ struct Walk<'a> {
 /// Renders the frames and takes all measures.
 ///
 /// # Errors
-/// Those of [`Sequence::at`] and of the `shell` method; [`Error::Usage`] for a frame that is not in the timeline, or a mesh
-/// whose topology is not that of the first frame.
+/// Those of [`Sequence::at`] and of the `shell` method; [`Error::Usage`] for a mesh whose topology is not that of the first frame.
 pub fn walk(sequence: &mut Sequence, options: &Options<'_>, setup: &Setup<'_>) -> Result<Outcome> {
     let timeline = *sequence.timeline();
-    let all: Vec<u32> = (1..=timeline.frames).collect();
-    let frames = if options.frames.is_empty() { &all } else { options.frames };
-    if let Some(frame) = frames.iter().find(|frame| !all.contains(frame)) {
-        return Err(Error::Usage {
-            message: format!("there is no frame {frame}: the scene has those from 1 to {}", timeline.frames),
-            help: Some("give --frames a range within these".into()),
-        });
-    }
+    // The device has admitted the first.
+    let admit_all = |_: &Sizes| Ok(());
     let opened = shell::open(setup)?;
     let admit =
         |sizes: &Sizes| opened.admit(&Sizes { picture: options.size.unwrap_or(sizes.picture), ..*sizes });
@@ -111,23 +103,35 @@ pub fn walk(sequence: &mut Sequence, options: &Options<'_>, setup: &Setup<'_>) -
     let tetrahedra = rest.scene.shell.cells.len() as u64;
     let mut walk = Walk {
         options,
-        setup,
         sorter: Sorter::new(&rest.scene.shell.topology),
         rest: rest.scene.shell.clone(),
         worst: Vec::new(),
         most: None,
     };
-    let mut loaded = sequence.at(frames[0], setup.progress.as_ref(), &admit)?;
-    let mut method = opened.prepare(Arc::new(walk.sized(loaded.scene.clone())))?;
+    let start = options.frames[0];
+    let mut loaded = match start {
+        1 => rest,
+        _ => sequence.at(start, setup.progress.as_ref(), &admit)?,
+    };
+    let mut scene = Arc::new(walk.sized(loaded.scene));
+    let mut method = opened.prepare(scene.clone())?;
     let mut device = String::new();
     let mut results: Vec<FrameResults> = Vec::new();
     let (mut first, mut before): (Option<Past>, Option<Past>) = (None, None);
-    for &frame in frames {
+    for &frame in options.frames {
         setup.interrupt.check()?;
-        if frame != frames[0] {
-            loaded = sequence.at(frame, setup.progress.as_ref(), &|_| Ok(()))?;
+        if frame != start {
+            loaded = sequence.at(frame, setup.progress.as_ref(), &admit_all)?;
+            scene = Arc::new(walk.sized(loaded.scene));
+            walk.check_topology(frame, &scene)?;
+            method.update(scene.clone())?;
         }
-        let (past, found) = walk.frame(method.as_mut(), frame, &loaded, before.as_ref(), &mut device)?;
+        setup.progress.stage(&format!("rendering frame {frame}"));
+        let rendered = method.render(&scene.view)?;
+        device = rendered.report.device.clone();
+        setup.progress.stage(&format!("measuring frame {frame}"));
+        let (past, mut found) = walk.frame(frame, &scene, rendered, &loaded.backdrop, before.as_ref())?;
+        found.stages.splice(..0, std::mem::take(&mut loaded.stages));
         results.push(found);
         if frame == 1 && timeline.loops {
             first = Some(past.clone());
@@ -173,26 +177,27 @@ impl Walk<'_> {
         scene
     }
 
+    fn check_topology(&self, frame: u32, scene: &Scene) -> Result<()> {
+        let (topology, rest) = (&scene.shell.topology, &self.rest.topology);
+        if Arc::ptr_eq(topology, rest) || **topology == **rest {
+            return Ok(());
+        }
+        Err(Error::Usage {
+            message: format!("frame {frame} has a mesh of other triangles than frame 1"),
+            help: Some("an animation can be checked where all its frames share their topology".into()),
+        })
+    }
+
+    /// All measures of a rendered frame.
     fn frame(
         &mut self,
-        method: &mut dyn Method,
         frame: u32,
-        loaded: &Loaded,
+        scene: &Arc<Scene>,
+        Frame { image, report, .. }: Frame,
+        backdrop: &Backdrop,
         before: Option<&Past>,
-        device: &mut String,
     ) -> Result<(Past, FrameResults)> {
-        let scene = Arc::new(self.sized(loaded.scene.clone()));
         let shell = &scene.shell;
-        if *shell.topology != *self.rest.topology {
-            return Err(Error::Usage {
-                message: format!("frame {frame} has a mesh of other triangles than frame 1"),
-                help: Some("an animation can be checked where all its frames share their topology".into()),
-            });
-        }
-        method.update(scene.clone())?;
-        self.setup.progress.stage(&format!("rendering frame {frame}"));
-        let Frame { image, report, .. } = method.render(&scene.view)?;
-        self.setup.progress.stage(&format!("measuring frame {frame}"));
         let deformations = deformations(&self.rest, shell);
         let sorted = self.sorter.sort(shell, &scene.view);
         let check = check_pixels(shell, &sorted.order, &scene.view);
@@ -213,11 +218,10 @@ impl Walk<'_> {
                 cycle_members: sorted.cycle_members,
             },
             pops: successor.map(|before| compare(before, &past)).transpose()?,
-            stages: loaded.stages.iter().cloned().chain(report.stages).collect(),
+            stages: report.stages,
             skipped: report.skipped,
         };
-        *device = report.device;
-        self.look(&found, &past, &deformations, &loaded.backdrop);
+        self.look(&found, &past, &deformations, backdrop);
         Ok((past, found))
     }
 
