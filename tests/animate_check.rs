@@ -142,8 +142,8 @@ fn a_clean_rigid_motion_has_no_fault() {
 #[test]
 fn an_inverted_tetrahedron_is_found_at_its_frame_with_the_thickness_that_would_do() {
     let track =
-        "[[track]]\nkey = 'shell.thickness'\nease = 'step'\nat = [0, 3, 4]\nvalues = [0.2, 0.9, 0.2]\n";
-    let folder = Folder::new(&format!("{MESHES}{track}"), |_| 4.0);
+        "[[track]]\nkey = 'shell.thickness'\nease = 'step'\nat = [0, 3, 4]\nvalues = [0.2, 1.6, 0.2]\n";
+    let folder = Folder::new(&format!("{MESHES}{track}"), |_| 8.0);
     let (frames, is_clean) = folder.frames(&["--size", "32x32"]);
     assert!(!is_clean);
     assert_eq!(with(&frames, "/inverted/count"), [4]);
@@ -156,7 +156,7 @@ fn an_inverted_tetrahedron_is_found_at_its_frame_with_the_thickness_that_would_d
     let factor = frames[3]["fold"]["factor"].as_f64().unwrap();
     assert!(factor > 0.0 && factor < 1.0);
     let inverted_at = |factor: f64| {
-        let thickness = format!("shell.thickness={}", 0.9 * factor);
+        let thickness = format!("shell.thickness={}", 1.6 * factor);
         folder.write("scene.toml", &format!("{SCENE}{MESHES}"));
         let (frames, _) = folder.frames(&["--size", "32x32", "-D", &thickness]);
         with(&frames, "/inverted/count")
@@ -237,5 +237,5 @@ fn what_cannot_be_is_refused_before_the_first_frame() {
     };
     refused(&["--frames", "3-9"], 2, "there is no frame 9");
     refused(&["--heatmap", "nowhere/map.png"], 6, "nowhere");
-    refused(&["-D", "shell.thickness=-1"], 3, "thickness");
+    refused(&["-D", "shell.thickness=-1"], 2, "thickness");
 }
