@@ -1,19 +1,25 @@
 //! Pixels that pop: that change more between two frames than their motion explains.
 //!
 //! Every vertex is projected in both frames, and where the texture slides over the shell the point where its texel was before
-//! (to the nearest whole turn). In a tile of 16 x 16 pixels no tetrahedron, at either time, moves by more than the tile's
-//! bound; what is seen in a pixel was before within that bound of it, and one pixel more for rounding to pixels. So the pixel's
-//! colour ought to be among those of that neighbourhood in the other frame: between the least and the greatest in each
-//! channel, or no further beyond them than half of what is between them. That is what a wave of four pixels a period or more
-//! can hide between the pixels: sampled at the worst phase both across and down, its extremes are `cos(pi / 4)^2 = 1 / 2` of
-//! what they are. A pixel *pops* where it is further out by more than [`TOLERANCE`], and the frame before is not explained by the
-//! frame after either: what comes into view from behind is found in no pixel before it, but takes nothing away; what is
-//! replaced is unexplained in both directions. A spot that appears is seen where it is larger than the neighbourhood.
+//! (to the nearest whole turn). The motions of the tetrahedra that are seen in a tile of 16 x 16 pixels, at either time, make a
+//! box of vectors; what is seen in a pixel was before at the pixel less one of these, and one pixel more for rounding to
+//! pixels. So the pixel's colour ought to be among those of that neighbourhood in the other frame: between the least and the
+//! greatest in each channel, or no further beyond them than half of what is between them. That is what a wave of four pixels a
+//! period or more can hide between the pixels: sampled at the worst phase both across and down, its extremes are
+//! `cos(pi / 4)^2 = 1 / 2` of what they are. A pixel *pops* where it is further out by more than [`TOLERANCE`], and what was there
+//! before is not explained by the frame after either: what comes into view from behind is found in no pixel before it, but
+//! takes nothing away; what is replaced is unexplained in both directions. A spot that appears is seen where it is larger
+//! than the neighbourhood.
+//!
+//! In a tile that is opaque all over at both times, and where there are no surfaces beside the shell, no tetrahedron is seen that
+//! begins deeper than the mean depth at which light was stopped in any of its pixels by more than the shell is thick. In other
+//! tiles all are seen, and the background, which stands still, too.
 //!
 //! Assumed: texture, light and transparency change by less than the tolerance from frame to frame where nothing moves; the
 //! surfaces beside the shell stand still. Where the neighbourhood is wider than [`WIDEST`] or goes over the picture's edge
 //! nothing is said: such pixels are not judged.
 
+use std::ops::RangeInclusive;
 use std::sync::Arc;
 
 use glam::{DMat3, DVec2, DVec3};
@@ -21,6 +27,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::LISTED;
+use super::fold::thickness;
 use crate::frame::Image;
 use crate::scene::View;
 use crate::shell::Shell;
@@ -28,8 +35,11 @@ use crate::shell::Shell;
 /// Of linear premultiplied RGBA, where white is 1: what fades in or out within ten frames stays below.
 pub const TOLERANCE: f32 = 0.1;
 
-/// The largest neighbourhood, in pixels to each side.
-pub const WIDEST: u32 = 48;
+/// The widest and highest neighbourhood, in pixels.
+pub const WIDEST: i64 = 96;
+
+/// A pixel of this alpha hides what is behind it.
+const OPAQUE: f32 = 0.98;
 
 /// Pixels along a tile's side.
 const TILE: usize = 16;
@@ -43,6 +53,10 @@ pub struct Seen<'a> {
     pub view: &'a View,
     /// The picture.
     pub image: &'a Image,
+    /// Of each pixel, as in [`Frame::depth`](crate::frame::Frame::depth).
+    pub depth: &'a [f32],
+    /// Whether there are surfaces beside the shell.
+    pub has_solids: bool,
 }
 
 /// What pops between a frame and the one that was compared before it.
@@ -63,11 +77,11 @@ pub struct Pops {
 /// Compares two frames of one size, whose shells have one topology.
 pub fn pops(since: u32, before: Seen<'_>, now: Seen<'_>) -> Pops {
     let (width, height) = (now.image.width as usize, now.image.height as usize);
-    let [columns, rows] = [width, height].map(|side| side.div_ceil(TILE));
-    let radii = radii(before, now, [columns, rows]);
-    let tiles = (0..columns * rows).into_par_iter().filter_map(|tile| {
-        let radius = radii[tile]?;
-        Some(compare(before.image, now.image, [tile % columns, tile / columns].map(|at| at * TILE), radius))
+    let grid = [width, height].map(|side| side.div_ceil(TILE));
+    let motions = motions(before, now, grid);
+    let tiles = motions.into_par_iter().enumerate().filter_map(|(tile, motion)| {
+        let at = [tile % grid[0], tile / grid[0]].map(|at| at * TILE);
+        motion.reach().map(|reach| compare(before.image, now.image, at, &reach))
     });
     let tiles: Vec<Tile> = tiles.collect();
     let mut popping: Vec<[u32; 2]> = tiles.iter().flat_map(|tile| tile.popping.iter().copied()).collect();
@@ -81,55 +95,122 @@ pub fn pops(since: u32, before: Seen<'_>, now: Seen<'_>) -> Pops {
     }
 }
 
-/// The reach of each tile's neighbourhood in pixels; `None` where it is too wide.
-fn radii(before: Seen<'_>, now: Seen<'_>, [columns, rows]: [usize; 2]) -> Vec<Option<u32>> {
-    let mut bounds = vec![0.0_f64; columns * rows];
-    let same_shell = Arc::ptr_eq(before.shell, now.shell) && before.view == now.view;
-    let moving = if same_shell { 0 } else { now.shell.cells.len() };
-    let eyes = [before.view, now.view].map(Eye::of);
+/// A box of vectors, from a frame to the next, in pixels; empty where `low` is above `high`.
+#[derive(Clone, Copy)]
+struct Motion {
+    low: DVec2,
+    high: DVec2,
+}
+
+impl Motion {
+    const NONE: Self = Self { low: DVec2::INFINITY, high: DVec2::NEG_INFINITY };
+    const REST: Self = Self { low: DVec2::ZERO, high: DVec2::ZERO };
+
+    fn and(self, other: Self) -> Self {
+        Self { low: self.low.min(other.low), high: self.high.max(other.high) }
+    }
+
+    /// `None` where it is too wide to tell anything.
+    fn reach(self) -> Option<Reach> {
+        let Self { low, high } = if self.low.x <= self.high.x { self } else { Self::REST };
+        if (high - low).max_element() + 4.0 > WIDEST as f64 || !(low.is_finite() && high.is_finite()) {
+            return None;
+        }
+        let axis = |low: f64, high: f64| {
+            let (low, high) = (low.floor() as i64, high.ceil() as i64);
+            let middle = (low + high).div_euclid(2);
+            [-high - 1..=-low + 1, -middle..=-middle, low - middle - 1..=high - middle + 1]
+        };
+        let [x, y] = [axis(low.x, high.x), axis(low.y, high.y)];
+        let [[from_x, place_x, to_x], [from_y, place_y, to_y]] = [x, y];
+        Some(Reach { from: [from_x, from_y], place: [*place_x.start(), *place_y.start()], to: [to_x, to_y] })
+    }
+}
+
+/// The neighbourhoods of the pixels of a tile, relative to the pixel.
+struct Reach {
+    /// In the frame before, of what is seen now.
+    from: [RangeInclusive<i64>; 2],
+    /// In the frame before, what was most likely there.
+    place: [i64; 2],
+    /// In the frame now, of what was at `place`.
+    to: [RangeInclusive<i64>; 2],
+}
+
+/// How what is seen in each tile moves.
+fn motions(before: Seen<'_>, now: Seen<'_>, grid @ [columns, rows]: [usize; 2]) -> Vec<Motion> {
+    let seen = [before, now];
+    let depths = seen.map(|seen| deepest(seen, grid));
+    let has_solids = seen.iter().any(|seen| seen.has_solids);
+    let hides = |tile: usize| !has_solids && depths.iter().all(|depths| depths[tile].is_finite());
+    let start = |tile: usize| if hides(tile) { Motion::NONE } else { Motion::REST };
+    let mut motions: Vec<Motion> = (0..columns * rows).map(start).collect();
+    let stands_still = Arc::ptr_eq(before.shell, now.shell) && before.view == now.view;
+    let count = if stands_still { 0 } else { now.shell.cells.len() };
+    let eyes = seen.map(|seen| Eye::of(seen.view));
+    let thickness = seen.map(|seen| thickness(seen.shell).greatest);
     let paths =
-        (0..moving).into_par_iter().map(|t| path(before.shell, now.shell, &eyes, t)).collect::<Vec<_>>();
-    for Path { low, high, motion } in paths.into_iter().flatten() {
+        (0..count).into_par_iter().map(|t| path(before.shell, now.shell, &eyes, t)).collect::<Vec<_>>();
+    for Path { low, high, motion, nearest } in paths.into_iter().flatten() {
         // The filter's footprint is about a pixel.
         let tile = |at: f64, count: usize| ((at / TILE as f64).max(0.0) as usize).min(count);
-        let (left, right) = (tile(low.x - 1.0, columns), tile(high.x + 1.0 + TILE as f64, columns));
-        let (top, bottom) = (tile(low.y - 1.0, rows), tile(high.y + 1.0 + TILE as f64, rows));
-        for row in top..bottom {
-            for bound in &mut bounds[row * columns + left..row * columns + right.max(left)] {
-                *bound = bound.max(motion);
+        let columns_met = tile(low.x - 1.0, columns)..tile(high.x + 1.0 + TILE as f64, columns);
+        let rows_met = tile(low.y - 1.0, rows)..tile(high.y + 1.0 + TILE as f64, rows);
+        for tile in rows_met.flat_map(|row| columns_met.clone().map(move |column| row * columns + column)) {
+            let is_hidden = |i: usize| nearest[i] > depths[i][tile] + thickness[i];
+            if !(hides(tile) && is_hidden(0) && is_hidden(1)) {
+                motions[tile] = motions[tile].and(motion);
             }
         }
     }
-    let radius = |bound: f64| bound.ceil() + 1.0;
-    bounds.into_iter().map(|b| (radius(b) <= f64::from(WIDEST)).then(|| radius(b) as u32)).collect()
+    motions
 }
 
-/// Where a tetrahedron is in the picture at either time, and how far its vertices move, in pixels.
+/// The depth of the deepest pixel of each tile; infinite where one is not opaque.
+fn deepest(seen: Seen<'_>, [columns, rows]: [usize; 2]) -> Vec<f64> {
+    let mut depths = vec![0.0_f64; columns * rows];
+    let width = seen.image.width as usize;
+    for (pixel, ([.., alpha], depth)) in seen.image.rgba.iter().zip(seen.depth).enumerate() {
+        let tile = pixel / width / TILE * columns + pixel % width / TILE;
+        depths[tile] = depths[tile].max(if *alpha >= OPAQUE { f64::from(*depth) } else { f64::INFINITY });
+    }
+    depths
+}
+
+/// Where a tetrahedron is in the picture at either time, and how its vertices move.
 struct Path {
     low: DVec2,
     high: DVec2,
-    motion: f64,
+    motion: Motion,
+    /// The distance of its nearest vertex from the eye, before and now.
+    nearest: [f64; 2],
 }
 
 /// `None` for what is behind the eye at both times.
 fn path(before: &Shell, now: &Shell, eyes: &[Eye; 2], t: usize) -> Option<Path> {
     let (old, new) = (before.vertices_of(t), now.vertices_of(t));
     let slid = slid(before, now, t);
-    let old: [DVec3; 4] = std::array::from_fn(|k| old[k] + slid[k]);
-    let places =
-        [old, new].into_iter().zip(eyes).map(|(corners, eye)| corners.map(|corner| eye.place(corner)));
-    let places: Vec<[Option<DVec2>; 4]> = places.collect();
-    if places.iter().flatten().all(Option::is_none) {
+    let came: [DVec3; 4] = std::array::from_fn(|k| old[k] + slid[k]);
+    let [from, to] =
+        [(came, &eyes[0]), (new, &eyes[1])].map(|(corners, eye)| corners.map(|corner| eye.place(corner)));
+    if from.iter().chain(&to).all(Option::is_none) {
         return None;
     }
-    let Some(all) = places.iter().flatten().copied().collect::<Option<Vec<DVec2>>>() else {
-        // It passes by the eye: it may be anywhere, and move by any length.
-        return Some(Path { low: DVec2::ZERO, high: DVec2::INFINITY, motion: f64::INFINITY });
-    };
-    let low = all.iter().copied().fold(DVec2::INFINITY, DVec2::min);
-    let high = all.iter().copied().fold(DVec2::NEG_INFINITY, DVec2::max);
-    let motion = (0..4).map(|k| (all[k] - all[k + 4]).abs().max_element()).fold(0.0, f64::max);
-    Some(Path { low, high, motion })
+    let nearest = [(old, &eyes[0]), (new, &eyes[1])].map(|(corners, eye)| {
+        corners.into_iter().map(|corner| corner.distance(eye.view.camera.eye)).fold(f64::INFINITY, f64::min)
+    });
+    let mut path = Path { low: DVec2::INFINITY, high: DVec2::NEG_INFINITY, motion: Motion::NONE, nearest };
+    for (from, to) in from.into_iter().zip(to) {
+        let (Some(from), Some(to)) = (from, to) else {
+            // It passes by the eye: it may be anywhere, and move by any length.
+            let motion = Motion { low: DVec2::NEG_INFINITY, high: DVec2::INFINITY };
+            return Some(Path { low: DVec2::ZERO, high: DVec2::INFINITY, motion, nearest: [0.0; 2] });
+        };
+        path.low = path.low.min(from).min(to);
+        path.high = path.high.max(from).max(to);
+        path.motion = path.motion.and(Motion { low: to - from, high: to - from });
+    }
+    Some(path)
 }
 
 /// From each vertex to where, in the frame before, the texel lay that is at the vertex now; world space.
@@ -180,17 +261,24 @@ struct Tile {
     greatest: f32,
 }
 
-fn compare(before: &Image, now: &Image, [left, top]: [usize; 2], radius: u32) -> Tile {
-    let [width, height, radius] = [now.width, now.height, radius].map(|side| side as usize);
+fn compare(before: &Image, now: &Image, [left, top]: [usize; 2], reach: &Reach) -> Tile {
+    let [width, height] = [now.width, now.height].map(|side| side as usize);
     let mut tile = Tile { popping: Vec::new(), judged: 0, greatest: 0.0 };
-    let forth = Ranges::of(before, [left, top], radius);
-    let back = Ranges::of(now, [left, top], radius);
-    for y in top.max(radius)..(top + TILE).min(height.saturating_sub(radius)) {
-        for x in left.max(radius)..(left + TILE).min(width.saturating_sub(radius)) {
+    let from = Ranges::of(before, [left, top], &reach.from);
+    let to = Ranges::of(now, [left, top], &reach.to);
+    let is_inside = |at: usize, axis: usize, end: usize| {
+        let [from, to] = [&reach.from[axis], &reach.to[axis]];
+        let low = reach.place[axis].min(*from.start()).min(*to.start());
+        let high = reach.place[axis].max(*from.end()).max(*to.end());
+        at as i64 + low >= 0 && at as i64 + high < end as i64
+    };
+    for y in (top..(top + TILE).min(height)).filter(|&y| is_inside(y, 1, height)) {
+        for x in (left..(left + TILE).min(width)).filter(|&x| is_inside(x, 0, width)) {
             tile.judged += 1;
-            let pixel = y * width + x;
             let at = [x - left, y - top];
-            let beyond = forth.beyond(at, now.rgba[pixel]).min(back.beyond(at, before.rgba[pixel]));
+            let [old_x, old_y] = [x as i64 + reach.place[0], y as i64 + reach.place[1]].map(|at| at as usize);
+            let (colour, old) = (now.rgba[y * width + x], before.rgba[old_y * width + old_x]);
+            let beyond = from.beyond(at, colour).min(to.beyond(at, old));
             tile.greatest = tile.greatest.max(beyond);
             if beyond > TOLERANCE {
                 tile.popping.push([x as u32, y as u32]);
@@ -205,22 +293,25 @@ struct Ranges([[[f32; 4]; 2]; TILE * TILE]);
 
 impl Ranges {
     /// First along the rows, then down the columns; what is beyond the picture is left out.
-    fn of(image: &Image, [left, top]: [usize; 2], radius: usize) -> Self {
+    fn of(image: &Image, [left, top]: [usize; 2], [across, down]: &[RangeInclusive<i64>; 2]) -> Self {
         let [width, height] = [image.width, image.height].map(|side| side as usize);
-        let rows = top.saturating_sub(radius)..(top + TILE + radius).min(height);
-        let around = |at: usize, end: usize| at.saturating_sub(radius)..(at + radius + 1).min(end);
+        let inside = |at: i64, end: usize| at.clamp(0, end as i64) as usize;
+        let around = |at: usize, range: &RangeInclusive<i64>, end: usize| {
+            inside(at as i64 + range.start(), end)..inside(at as i64 + range.end() + 1, end)
+        };
+        let first_row = inside(top as i64 + down.start(), height);
+        let rows = first_row..inside((top + TILE) as i64 + down.end(), height);
         let along: Vec<[[f32; 4]; 2]> = rows
-            .clone()
             .flat_map(|y| (left..left + TILE).map(move |x| (x, y)))
             .map(|(x, y)| {
-                let pixels = around(x, width).map(|x| image.rgba[y * width + x]);
+                let pixels = around(x, across, width).map(|x| image.rgba[y * width + x]);
                 pixels.fold(NONE, |range, pixel| joined(range, [pixel, pixel]))
             })
             .collect();
         let mut ranges = [NONE; TILE * TILE];
         for (i, range) in ranges.iter_mut().enumerate() {
             let (x, y) = (i % TILE, top + i / TILE);
-            let near = around(y, height).map(|y| along[(y - rows.start) * TILE + x]);
+            let near = around(y, down, height).map(|y| along[(y - first_row) * TILE + x]);
             *range = near.fold(NONE, joined);
         }
         Self(ranges)
@@ -261,6 +352,11 @@ mod tests {
         image
     }
 
+    /// All is seen, however deep.
+    fn depths() -> Vec<f32> {
+        vec![100.0; (SIDE * SIDE) as usize]
+    }
+
     /// A part of the ring that fills the picture.
     fn view(shell: &Shell) -> View {
         let camera = Camera { target: DVec3::X, fov_y: 0.1, ..Camera::framing(&shell.vertices) };
@@ -275,10 +371,11 @@ mod tests {
         let right = view.camera.frame().right;
         let now = Arc::new(moved(&before, |p| p + step * right));
         let (first, second) = (stripes(0.0), stripes(2.3));
-        let seen = |shell, image| Seen { shell, view: &view, image };
+        let depth = depths();
+        let seen = |shell, image| Seen { shell, view: &view, image, depth: &depth, has_solids: false };
         let found = pops(7, seen(&before, &first), seen(&now, &second));
         assert_eq!((found.since, found.pixels), (7, 0), "{found:?}");
-        // Neighbourhoods are some 4 pixels wide: the rest is judged.
+        // Neighbourhoods reach some 4 pixels: the rest is judged.
         assert!(found.judged > 80 * 80, "{found:?}");
 
         let mut popped = second.clone();
@@ -299,7 +396,8 @@ mod tests {
         let shell = Arc::new(torus(0.1));
         let view = view(&shell);
         let (image, other) = (stripes(0.0), stripes(4.0));
-        let seen = |image| Seen { shell: &shell, view: &view, image };
+        let depth = depths();
+        let seen = |image| Seen { shell: &shell, view: &view, image, depth: &depth, has_solids: false };
         assert_eq!(pops(1, seen(&image), seen(&image)).pixels, 0);
         assert!(pops(1, seen(&image), seen(&other)).pixels > 1000, "crests take the place of troughs");
         assert_eq!(pops(1, seen(&image), seen(&image)).judged, u64::from(SIDE - 2).pow(2));
@@ -321,16 +419,49 @@ mod tests {
     }
 
     #[test]
+    fn a_pan_is_followed_however_long() {
+        let before = Arc::new(torus(0.1));
+        let view = view(&before);
+        let step = 20.0 * view.pixel_at_unit_depth() * view.camera.eye.distance(view.camera.target);
+        let now = Arc::new(moved(&before, |p| p + step * view.camera.frame().right));
+        let (first, second, depth) = (stripes(0.0), stripes(20.0), depths());
+        let seen = |shell, image| Seen { shell, view: &view, image, depth: &depth, has_solids: false };
+        let found = pops(1, seen(&before, &first), seen(&now, &second));
+        assert!(found.pixels == 0 && found.judged > 60 * 80, "{found:?}");
+        let mut replaced = second.clone();
+        replaced.rgba.iter_mut().for_each(|pixel| *pixel = [0.1, 0.9, 0.9, 1.0]);
+        assert_eq!(pops(1, seen(&before, &first), seen(&now, &replaced)).pixels, found.judged);
+    }
+
+    #[test]
+    fn what_an_opaque_surface_hides_moves_unseen() {
+        let before = Arc::new(torus(0.1));
+        let view = view(&before);
+        let [eye, middle] = [view.camera.eye, view.camera.target];
+        let (distance, frame) = (eye.distance(middle), view.camera.frame());
+        let step = 10.0 * view.pixel_at_unit_depth() * distance;
+        let behind = |p: DVec3| (p - middle).dot(frame.forward) > 0.0;
+        let now = Arc::new(moved(&before, |p| if behind(p) { p + step * frame.right } else { p }));
+        let image = stripes(0.0);
+        let widest = |depth: f64| {
+            let depth = vec![depth as f32; (SIDE * SIDE) as usize];
+            let seen = |shell| Seen { shell, view: &view, image: &image, depth: &depth, has_solids: false };
+            // The tile around the middle.
+            motions(seen(&before), seen(&now), [6, 6])[3 * 6 + 3].high.x
+        };
+        assert!(widest(distance + 1.0) > 9.0);
+        // The tube is 0.35 thick to each side; what is 0.1 thick begins no deeper than half of that.
+        assert!(widest(distance - 0.35) < 0.1, "{}", widest(distance - 0.35));
+    }
+
+    #[test]
     fn nothing_is_said_of_what_moves_too_far() {
         let before = Arc::new(torus(0.1));
         let view = view(&before);
-        let now = Arc::new(moved(&before, |p| p + view.camera.frame().right));
-        let image = stripes(0.0);
-        let found = pops(
-            1,
-            Seen { shell: &before, view: &view, image: &image },
-            Seen { shell: &now, view: &view, image: &stripes(1.0) },
-        );
+        let now = Arc::new(moved(&before, |p| p + 2.0 * view.camera.frame().right * p.y));
+        let (first, second, depth) = (stripes(0.0), stripes(1.0), depths());
+        let seen = |shell, image| Seen { shell, view: &view, image, depth: &depth, has_solids: false };
+        let found = pops(1, seen(&before, &first), seen(&now, &second));
         assert!(found.judged < 60 * 60, "{found:?}");
     }
 }

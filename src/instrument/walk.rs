@@ -70,11 +70,18 @@ struct Past {
     frame: u32,
     scene: Arc<Scene>,
     image: Arc<Image>,
+    depth: Arc<[f32]>,
 }
 
 impl Past {
     fn seen(&self) -> Seen<'_> {
-        Seen { shell: &self.scene.shell, view: &self.scene.view, image: &self.image }
+        Seen {
+            shell: &self.scene.shell,
+            view: &self.scene.view,
+            image: &self.image,
+            depth: &self.depth,
+            has_solids: !self.scene.solids.is_empty(),
+        }
     }
 }
 
@@ -174,6 +181,7 @@ impl Walk<'_> {
     fn sized(&self, mut scene: Scene) -> Scene {
         let own = [scene.view.width, scene.view.height];
         [scene.view.width, scene.view.height] = self.options.size.unwrap_or(own);
+        scene.view.depth = true;
         scene
     }
 
@@ -193,7 +201,7 @@ impl Walk<'_> {
         &mut self,
         frame: u32,
         scene: &Arc<Scene>,
-        Frame { image, report, .. }: Frame,
+        Frame { image, depth, report }: Frame,
         backdrop: &Backdrop,
         before: Option<&Past>,
     ) -> Result<(Past, FrameResults)> {
@@ -201,7 +209,8 @@ impl Walk<'_> {
         let deformations = deformations(&self.rest, shell);
         let sorted = self.sorter.sort(shell, &scene.view);
         let check = check_pixels(shell, &sorted.order, &scene.view);
-        let past = Past { frame, scene: scene.clone(), image: Arc::new(image) };
+        let depth = depth.expect("the view asks for it").into();
+        let past = Past { frame, scene: scene.clone(), image: Arc::new(image), depth };
         let successor = before.filter(|before| before.frame + 1 == frame);
         let found = FrameResults {
             frame,
