@@ -450,8 +450,8 @@ mod tests {
             motions(seen(&before), seen(&now), [6, 6])[3 * 6 + 3].high.x
         };
         assert!(widest(distance + 1.0) > 9.0);
-        // The tube is 0.35 thick to each side; what is 0.1 thick begins no deeper than half of that.
-        assert!(widest(distance - 0.35) < 0.1, "{}", widest(distance - 0.35));
+        // Tetrahedra are up to 0.55 long, along the ring: none that reaches behind the middle begins before that.
+        assert!(widest(distance - 0.7) < 0.1, "{}", widest(distance - 0.7));
     }
 
     #[test]
