@@ -61,6 +61,11 @@ fn compile_all(folder: &Path) -> Result<String, String> {
         let line = text.lines().find_map(|line| line.strip_prefix("// switches: ")).unwrap_or_default();
         let switches: Vec<Switch<'_>> = line.split_whitespace().map(Switch::parse).collect();
         let names: Vec<&str> = switches.iter().map(|switch| switch.name).collect();
+        if let Some(unknown) =
+            switches.iter().filter_map(|switch| switch.needs).find(|needs| !names.contains(needs))
+        {
+            return Err(format!("{}: a switch needs `{unknown}`, which is none", path.display()));
+        }
         let family = format!("{}_{}", stem.to_uppercase(), stage.to_uppercase());
         let mut variants = String::new();
         for set in 0..1_usize << switches.len() {

@@ -54,12 +54,12 @@ void place(float from, float step, float before, float optical) {
     if (now >= nearly && all_but_dark >= 3.0e38) all_but_dark = reach(nearly, before, optical, from, step);
 }
 
-// The optical depth of the ray, and where it ends.
-float follow(vec3 origin, vec3 ray, out float end_depth) {
+// The optical depth of the ray, and where it ends; false where that is more than can be resolved.
+bool follow(vec3 origin, vec3 ray, out float optical, out float end_depth) {
     LightPicture light = light_pictures[picture];
     bool is_parallel = light.is_parallel != 0;
     float per_depth = length(ray) * light.opacity_distances;
-    float optical = 0.0;
+    optical = 0.0;
     float z = 0.0;
     float horizon;
     end_depth = 0.0;
@@ -114,8 +114,7 @@ float follow(vec3 origin, vec3 ray, out float end_depth) {
         }
         done = horizon >= 3.0e38 || optical >= DARK;
     } while (!done && passes <= MOST_PASSES);
-    // Not silently: what is lit by this is then no number either.
-    return done && passes <= MOST_PASSES ? optical : uintBitsToFloat(0x7fc00000u);
+    return done && passes <= MOST_PASSES;
 }
 
 void main() {
@@ -123,8 +122,11 @@ void main() {
     vec2 place = (gl_FragCoord.xy - light.middle) * vec2(light.pixel, -light.pixel);
     vec3 origin = light.is_parallel != 0 ? vec3(place, 0.0) : vec3(0.0);
     vec3 ray = light.is_parallel != 0 ? vec3(0.0, 0.0, 1.0) : vec3(place, 1.0);
-    float end;
-    float optical = follow(origin, ray, end);
+    float optical, end;
+    if (!follow(origin, ray, optical, end)) {
+        for (uint i = 0; i < CURVE_IMAGES; i++) out_curve[i] = vec4(UNRESOLVED);
+        return;
+    }
     if (optical == 0.0) discard;
     float whole = min(opacity(optical), 1.0);
     end = min(end, all_but_dark);

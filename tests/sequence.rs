@@ -9,6 +9,7 @@ use common::Watched;
 use mesoshell::frame::Report;
 use mesoshell::progress::Silent;
 use mesoshell::scene::{Loaded, Scene, Sequence};
+use mesoshell::volume::{self, Volume};
 
 const STILL: &str = r#"
 mesh = { generator = "torus", segments = 16, rings = 8 }
@@ -230,6 +231,45 @@ fn mistakes_are_told_before_the_first_frame() {
     let mut sequence = animation.open();
     let error = sequence.at(7, &Silent, &|_| Ok(())).map(drop).unwrap_err();
     assert!(error.to_string().contains("no frame 7: the scene has those from 1 to 6"), "{error}");
+}
+
+#[test]
+fn volumes_follow_one_another() {
+    let animation = Animation::new(&[]);
+    let file = |number: u32| animation.0.path().join(format!("v.{number:02}.ktx2"));
+    let write = |number: u32, size: [u32; 3]| {
+        let texels = vec![[0.1, 0.0, 0.0, 0.1 * number as f32]; size.iter().product::<u32>() as usize];
+        volume::write_volume(&file(number), &Volume::new(size, texels).unwrap()).unwrap();
+    };
+    (2..=4).for_each(|number| write(number, [2, 2, 2]));
+    let scene = STILL.replace("recipe = \"clouds.toml\"", "file = \"v.##.ktx2\", rate = 1.5");
+    std::fs::write(animation.path(), &scene).unwrap();
+    let mut sequence = animation.open();
+    // Three frames a second, two of each file.
+    for (frame, number) in (1..=6).zip([2.0, 2.0, 3.0, 3.0, 4.0, 4.0]) {
+        let scene = at(&mut sequence, frame);
+        assert!((scene.volume.levels[0].texels[0][3] - 0.1 * number as f32).abs() < 1e-6, "frame {frame}");
+        assert_eq!(differences(&scene, &at(&mut animation.open(), frame)), [""; 0]);
+        // What was made ahead is the same, wanted or not.
+        sequence.prefetch(frame % 3 + 1).unwrap();
+    }
+    assert_eq!(sequence.inputs(1).unwrap().files, [2, 3, 4].map(file));
+    let with = |key: &str| {
+        let mut sequence = Sequence::open(&animation.path(), &[key.to_owned()]).unwrap();
+        at(&mut sequence, 6).volume.levels[0].texels[0][3]
+    };
+    // After three files the first comes again; a time of its own stands.
+    assert!((with("volume.rate=3") - 0.4).abs() < 1e-6 && (with("volume.rate=2.4") - 0.3).abs() < 1e-6);
+    assert!((with("volume.time=0") - 0.2).abs() < 1e-6);
+    let told = || animation_error(&animation);
+    write(3, [2, 2, 1]);
+    assert!(told().contains("v.03.ktx2: has [2, 2, 1] texels, but"), "{}", told());
+    std::fs::remove_file(file(3)).unwrap();
+    assert!(told().contains("number 3 is missing, between 2 and 4"), "{}", told());
+}
+
+fn animation_error(animation: &Animation) -> String {
+    Sequence::open(&animation.path(), &[]).map(drop).unwrap_err().to_string()
 }
 
 #[test]

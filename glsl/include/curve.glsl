@@ -3,6 +3,8 @@
 // tolerance. In four colours of four: how much it grows from knot to knot, the opacity of all, and the depths of the knots; after
 // the last the opacity of all is reached.
 
+const float UNRESOLVED = -1.0; // all of them, where the curve is not known
+
 const uint CURVE_IMAGES = 4;
 const uint KNOTS = 4 * CURVE_IMAGES - 2;
 const uint GROWTHS = KNOTS - 1; // between knots

@@ -20,6 +20,8 @@ float growths_done(vec4 from, vec4 to, float depth) {
 // Of the medium alone, along the ray of one pixel.
 float transmittance_until(ivec2 pixel, float depth) {
     vec4 a = texelFetch(curve_0, pixel, 0);
+    // Not silently: what is lit by this is not finite, and the host sees that.
+    if (a.y == UNRESOLVED) return uintBitsToFloat(0x7f800000u);
     if (a.y == 0.0 || depth <= a.z) return 1.0;
     vec4 b = texelFetch(curve_1, pixel, 0);
     vec4 c = texelFetch(curve_2, pixel, 0);

@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use mesoshell::film::mark::{self, Making};
+use mesoshell::film::mark::{self, Marker};
 use mesoshell::film::moving::{self, FilmFormat};
 use mesoshell::film::{Film, Names};
 use mesoshell::frame::{Backdrop, Frame, Image, Report, Stopwatch, file};
@@ -79,6 +79,7 @@ impl Stage {
         &mut self,
         sequence: &mut Sequence,
         frame: u32,
+        next: Option<u32>,
         size: Option<[u32; 2]>,
         progress: &dyn Progress,
     ) -> Result<Drawn> {
@@ -88,6 +89,9 @@ impl Stage {
         };
         let Loaded { mut scene, backdrop, mut stages } = sequence.at(frame, progress, &admit)?;
         [scene.view.width, scene.view.height] = size.unwrap_or([scene.view.width, scene.view.height]);
+        if let Some(next) = next {
+            sequence.prefetch(next)?;
+        }
         let view = scene.view;
         let scene = Arc::new(scene);
         let mut watch = Stopwatch::start();
@@ -193,9 +197,8 @@ fn render(arguments: &Arguments, line: &Arc<FrameLine>, interrupt: &Interrupt) -
     let progress: Arc<dyn Progress> = line.clone();
     let setup = Setup { device: &device, validation: messages.as_ref(), progress: &progress, interrupt };
     let entry = method::by_name(&arguments.method).expect("clap lets through the names of the table alone");
-    let program = mark::of_program()?;
     let opened = (entry.open)(&setup)?;
-    let device_name = opened.device();
+    let mut marker = Marker::new(entry.name, &opened.device(), arguments.pixels())?;
     let mut stage = Stage { opened: Some(opened), method: None };
 
     let mut done = Rendered {
@@ -221,9 +224,7 @@ fn render(arguments: &Arguments, line: &Arc<FrameLine>, interrupt: &Interrupt) -
         if let Output::Pictures(names) = &output {
             let path = names.of(frame);
             let inputs = sequence.inputs(frame).map_err(of_frame)?;
-            let making =
-                Making { method: entry.name, device: &device_name, size: arguments.pixels(), program };
-            let made = mark::of_frame(&inputs, &making).map_err(of_frame)?;
+            let made = marker.mark(&inputs).map_err(of_frame)?;
             if !arguments.overwrite && mark::is_on(&path, &made) {
                 done.frames.push(RenderedFrame { frame, output: path, report: None });
                 done.up_to_date += 1;
@@ -233,8 +234,9 @@ fn render(arguments: &Arguments, line: &Arc<FrameLine>, interrupt: &Interrupt) -
         }
 
         let size = arguments.pixels();
+        let next = frames.get(index + 1).copied();
         let Drawn { image, backdrop, mut report } =
-            stage.render(&mut sequence, frame, size, progress.as_ref()).map_err(of_frame)?;
+            stage.render(&mut sequence, frame, next, size, progress.as_ref()).map_err(of_frame)?;
         let mut watch = Stopwatch::start();
         let path = match &output {
             Output::Pictures(names) => {

@@ -8,7 +8,7 @@ use ash::vk;
 use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
 
 use super::instance::{DeviceInfo, Instance, Messages};
-use super::target::Target;
+use super::target::{ReadBy, Target};
 use super::texture::{Texture3d, most_levels};
 use crate::{Error, Result};
 
@@ -164,7 +164,7 @@ impl Gpu {
     /// # Errors
     /// [`Error::Device`] where a side is too long, [`Error::OutOfMemory`].
     pub fn check_sizes(&self, picture: [u32; 2], volume: [u32; 3]) -> Result<()> {
-        Target::check(self, "the picture", picture, 1)?;
+        Target::check(self, "the picture", picture, 1, ReadBy::Host)?;
         Texture3d::check(self, "the volume", volume, most_levels(volume))?;
         Ok(())
     }

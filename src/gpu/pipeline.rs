@@ -20,6 +20,8 @@ pub enum Keeps {
     /// `destination += (1 - destination.alpha) * source`, in the order in which they are drawn. Only triangles that run clockwise
     /// on the picture are drawn.
     Blend,
+    /// The last, for targets that are read by shaders. Only triangles that run clockwise on the picture are drawn.
+    Last,
     /// That of the greatest depth value, for targets that keep the nearest; both sides of triangles are drawn.
     Nearest,
 }
@@ -57,6 +59,8 @@ pub struct Pipeline {
     /// Of the targets that it draws into.
     format: Rgba,
     attachments: usize,
+    /// Whether they have depths.
+    nearest: bool,
     gpu: Arc<Gpu>,
     // One thread at a time binds and draws.
     not_shared: PhantomData<Cell<()>>,
@@ -87,6 +91,7 @@ impl Pipeline {
             push_constant_bytes: info.push_constant_bytes,
             format: target.format,
             attachments: target.images.len(),
+            nearest,
             gpu: gpu.clone(),
             not_shared: PhantomData,
         };
@@ -127,7 +132,7 @@ impl Pipeline {
             .rasterization_samples(vk::SampleCountFlags::TYPE_1);
         let blends = vec![
             vk::PipelineColorBlendAttachmentState {
-                blend_enable: (!nearest).into(),
+                blend_enable: (info.keeps == Keeps::Blend).into(),
                 src_color_blend_factor: vk::BlendFactor::ONE_MINUS_DST_ALPHA,
                 dst_color_blend_factor: vk::BlendFactor::ONE,
                 color_blend_op: vk::BlendOp::ADD,
@@ -224,6 +229,13 @@ impl Pipeline {
             .chain([&draw.target.gpu]);
         assert!(devices.into_iter().all(|gpu| Arc::ptr_eq(gpu, &self.gpu)), "objects of several devices");
         assert_eq!((draw.target.format, draw.target.images.len()), (self.format, self.attachments));
+        assert_eq!(draw.target.depth.is_some(), self.nearest, "a target for the other kind of pipeline");
+        for (_, texture) in draw.textures {
+            if let Sampled::Picture(picture, _) = texture {
+                assert!(picture.sampler != vk::Sampler::null(), "a target that shaders cannot read");
+                assert!(!std::ptr::eq(*picture, draw.target), "a target that is read while it is drawn");
+            }
+        }
         assert_eq!(draw.push_constants.len(), self.push_constant_bytes as usize);
     }
 

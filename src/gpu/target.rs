@@ -35,6 +35,18 @@ pub struct Target {
     not_shared: PhantomData<Cell<()>>,
 }
 
+/// Who reads a target.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum ReadBy {
+    /// From a copy in its memory.
+    Host,
+    /// With a depth image, where the `nearest` is kept.
+    Shaders {
+        /// See [`Keeps::Nearest`](super::Keeps::Nearest).
+        nearest: bool,
+    },
+}
+
 /// Of surfaces.
 const DEPTH_FORMAT: vk::Format = vk::Format::D32_SFLOAT;
 
@@ -48,8 +60,8 @@ impl Target {
     /// # Panics
     /// Where there are no attachments, or more than the device draws into at once.
     pub fn new(gpu: &Arc<Gpu>, width: u32, height: u32, attachments: usize) -> Result<Self> {
-        let (_, bytes) = Self::check(gpu, "the picture", [width, height], attachments)?;
-        let mut target = Self::empty(gpu, "the picture", [width, height], attachments)?;
+        let (format, bytes) = Self::check(gpu, "the picture", [width, height], attachments, ReadBy::Host)?;
+        let mut target = Self::empty(gpu, "the picture", format, [width, height], attachments)?;
         target.readbacks =
             (0..attachments).map(|_| Buffer::readback(gpu, "the picture", bytes)).collect::<Result<_>>()?;
         target.finish()
@@ -69,8 +81,8 @@ impl Target {
         attachments: usize,
         nearest: bool,
     ) -> Result<Self> {
-        Self::check(gpu, name, [width, height], attachments)?;
-        let mut target = Self::empty(gpu, name, [width, height], attachments)?;
+        let (format, _) = Self::check(gpu, name, [width, height], attachments, ReadBy::Shaders { nearest })?;
+        let mut target = Self::empty(gpu, name, format, [width, height], attachments)?;
         if nearest {
             let features = vk::FormatFeatureFlags::DEPTH_STENCIL_ATTACHMENT;
             if !gpu.supports(DEPTH_FORMAT, features) {
@@ -94,10 +106,10 @@ impl Target {
     fn empty(
         gpu: &Arc<Gpu>,
         name: &'static str,
+        format: Rgba,
         [width, height]: [u32; 2],
         attachments: usize,
     ) -> Result<Self> {
-        let (format, _) = Self::check(gpu, name, [width, height], attachments)?;
         assert!((1..=gpu.limits.max_color_attachments as usize).contains(&attachments));
         let usage = vk::ImageUsageFlags::COLOR_ATTACHMENT
             | vk::ImageUsageFlags::TRANSFER_SRC
@@ -153,6 +165,7 @@ impl Target {
         name: &str,
         [width, height]: [u32; 2],
         attachments: usize,
+        read_by: ReadBy,
     ) -> Result<(Rgba, u64)> {
         if width.min(height) == 0 {
             let message = format!("{name}: {width} x {height} pixels");
@@ -172,15 +185,36 @@ impl Target {
                 help: Some("ask for a smaller picture".into()),
             });
         }
-        let features = vk::FormatFeatureFlags::COLOR_ATTACHMENT_BLEND
-            | vk::FormatFeatureFlags::TRANSFER_SRC
-            | vk::FormatFeatureFlags::SAMPLED_IMAGE;
-        let format = Rgba::best(gpu, features).ok_or_else(|| Error::Device {
-            message: format!("{} blends into no floating-point target", gpu.info().name),
-            help: None,
-        })?;
-        let bytes = u64::from(width) * u64::from(height) * format.bytes();
-        gpu.check_memory(name, 2 * bytes * attachments as u64)?;
+        let (format, lacks) = match read_by {
+            ReadBy::Host => {
+                let features =
+                    vk::FormatFeatureFlags::COLOR_ATTACHMENT_BLEND | vk::FormatFeatureFlags::TRANSFER_SRC;
+                (Rgba::best(gpu, features), "blends into no floating-point target")
+            }
+            // These hold depths and planes, for which 11 bits will not do.
+            ReadBy::Shaders { .. } => {
+                let features =
+                    vk::FormatFeatureFlags::COLOR_ATTACHMENT | vk::FormatFeatureFlags::SAMPLED_IMAGE;
+                let supported = gpu.supports(Rgba::F32.raw(), features);
+                (supported.then_some(Rgba::F32), "draws into no target of 32-bit floats")
+            }
+        };
+        let format = format
+            .ok_or_else(|| Error::Device { message: format!("{} {lacks}", gpu.info().name), help: None })?;
+        let pixels = u64::from(width) * u64::from(height);
+        let bytes = pixels * format.bytes();
+        let all = attachments as u64 * bytes;
+        let besides = match read_by {
+            ReadBy::Host => all,
+            ReadBy::Shaders { nearest } => {
+                if nearest {
+                    4 * pixels
+                } else {
+                    0
+                }
+            }
+        };
+        gpu.check_memory(name, all + besides)?;
         Ok((format, bytes))
     }
 

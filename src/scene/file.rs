@@ -183,12 +183,18 @@ pub struct VolumeSection {
     pub haze: Option<HazeSection>,
     /// Laid over the recipe's keys.
     pub vary: Option<toml::Table>,
+    /// Of a sequence of files: how many a second.
+    #[serde(default = "default_rate")]
+    pub rate: Rate,
+    /// Of a sequence of files: seconds after its first; by default the time of the frame.
+    pub time: Option<Finite>,
 }
 
 impl VolumeSection {
     /// The same, with what the texels do not depend on as if nothing were said of it.
     pub(super) fn texels(&self) -> Self {
-        Self { opacity_distance: None, lod_footprint: pixel_footprint(), ..self.clone() }
+        let (rate, lod_footprint) = (default_rate(), pixel_footprint());
+        Self { opacity_distance: None, lod_footprint, rate, time: None, ..self.clone() }
     }
 }
 
@@ -441,7 +447,7 @@ recipe = "fog.toml"
                 found += 1;
             }
         }
-        assert_eq!(found, 5 + 10 + 6 + 3 + 3 + 10 + 2 + 3);
+        assert_eq!(found, 5 + 12 + 6 + 3 + 3 + 10 + 2 + 3);
         for (section, count) in [("light", 6), ("solid", 6), ("track", 4)] {
             let text = Text::new("keys", format!("{SCENE}[[{section}]]\nunknown_key = 1"), &[]).unwrap();
             let message = text.parse::<SceneFile>(("mesh", "generator")).unwrap_err().to_string();

@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 
 use toml::{Table, Value};
 
+use super::numbered;
 use crate::input;
 use crate::volume::stack;
 
@@ -37,6 +38,10 @@ fn named_in_value(value: &Value, folder: &Path, files: &mut BTreeSet<PathBuf>) {
 
 fn add(path: &Path, files: &mut BTreeSet<PathBuf>) {
     if !path.is_file() {
+        if let Ok(Some(sequence)) = numbered::files(path) {
+            sequence.iter().for_each(|one| add(one, files));
+            return;
+        }
         // Of a folder or a pattern the slices, which name nothing.
         let slices = stack::images(path).unwrap_or_default();
         files.extend(slices.into_iter().filter(|slice| slice.is_file()));

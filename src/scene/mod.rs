@@ -23,6 +23,7 @@ pub mod file;
 mod files;
 mod lighting;
 pub mod load;
+mod numbered;
 mod parts;
 mod sequence;
 pub mod shading;

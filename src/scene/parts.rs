@@ -3,6 +3,7 @@
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::thread::JoinHandle;
 
 use glam::DVec2;
 use toml::Spanned;
@@ -12,6 +13,7 @@ use super::file::{
 };
 use super::lighting::Lighting;
 use super::load::Loaded;
+use super::numbered::Moment;
 use super::solids::Solids;
 use super::source::{MeshSource, VolumeSource};
 use super::text::Text;
@@ -61,6 +63,8 @@ impl<T> PartialEq for Same<T> {
 struct Texels {
     /// Without the keys that are not among it.
     section: VolumeSection,
+    /// Which of a sequence.
+    file: Option<PathBuf>,
     /// The opacity distance as [`Checked::opacity_distance`] tells it and the shell's thickness, where there is haze.
     haze: Option<(Option<f64>, f64)>,
     /// The shell whose texels are filtered, and its opacity distance.
@@ -82,6 +86,48 @@ type OfSolidFiles = (Option<BaseSection>, Vec<Spanned<SolidSection>>);
 /// The base mesh, where it is one.
 type OfSolids = (Same<Solids>, Option<Same<Mesh>>);
 
+/// How a volume is made: all that a thread needs that makes it ahead.
+struct VolumeWork {
+    source: VolumeSource,
+    section: VolumeSection,
+    thickness: f64,
+    opacity_distance: Option<f64>,
+    rest: Rest,
+}
+
+impl VolumeWork {
+    /// `lap` is told of each stage that is done.
+    fn make(
+        &self,
+        admit: &dyn Fn([u32; 3]) -> Result<()>,
+        resolve: &dyn Fn([u32; 3]) -> Result<()>,
+        lap: &mut dyn FnMut(&str),
+    ) -> Result<Arc<Pyramid>> {
+        let mut volume = self.source.load(admit, resolve)?;
+        let layers = f64::from(volume.size[2]);
+        let distance = |explicit: Option<f64>, thickness: f64| explicit.unwrap_or(thickness / layers);
+        let texel = {
+            let distance = distance(self.rest.opacity_distance, self.rest.thickness);
+            texel_edges(&self.rest.shell, volume.size).map(|edge| edge / distance)
+        };
+        if let Some(HazeSection { alpha, colour }) = &self.section.haze {
+            let distance = distance(self.opacity_distance, self.thickness);
+            let depth = -(-alpha.0).ln_1p() * distance / self.thickness;
+            Haze { colour: colour.0, depth }.fill(&mut volume);
+        }
+        lap("load.volume");
+        let pyramid = Pyramid::build_with(volume, self.section.filter, texel);
+        lap("load.pyramid");
+        Ok(Arc::new(pyramid))
+    }
+}
+
+/// A volume that a thread makes.
+struct Ahead {
+    of: Texels,
+    thread: JoinHandle<Result<Arc<Pyramid>>>,
+}
+
 /// The parts of the last scene.
 #[derive(Default)]
 pub(super) struct Parts {
@@ -90,6 +136,8 @@ pub(super) struct Parts {
     /// The shell before that, whose memory the next may have.
     spare: Option<Arc<Shell>>,
     volume: Kept<Texels, Arc<Pyramid>>,
+    /// Of the scene that may come next.
+    ahead: Option<Ahead>,
     directions: Kept<OfDirections, Arc<Directions>>,
     solid_files: Kept<OfSolidFiles, Arc<Solids>>,
     solids: Kept<OfSolids, Arc<[Solid]>>,
@@ -112,11 +160,16 @@ impl<'a> Checked<'a> {
     ///
     /// # Errors
     /// As [`load`](super::load()).
-    pub(super) fn new(text: &'a Text, file: &'a SceneFile, base_dir: &'a Path) -> Result<Self> {
+    pub(super) fn new(
+        text: &'a Text,
+        file: &'a SceneFile,
+        base_dir: &'a Path,
+        moment: Moment,
+    ) -> Result<Self> {
         Ok(Self {
             camera: sight::camera(text, file)?,
             mesh: MeshSource::of(text, &file.mesh)?,
-            volume: VolumeSource::of(text, &file.volume, base_dir)?,
+            volume: VolumeSource::of(text, &file.volume, base_dir, moment)?,
             lighting: Lighting::of(text, file, base_dir)?,
             text,
             file,
@@ -142,6 +195,20 @@ impl<'a> Checked<'a> {
         // The path that a density of 1 makes one optical depth long.
         let mean_free_path = section.density.as_ref().map(|density| density.extinction.0.recip());
         mean_free_path.or(section.opacity_distance.map(|distance| distance.0))
+    }
+
+    /// How its volume is made, and what that depends on.
+    fn volume_work(&self, rest: &Rest) -> (Texels, VolumeWork) {
+        let section = self.file.volume.get_ref();
+        let (thickness, opacity_distance) = (self.file.shell.thickness.0, self.opacity_distance());
+        let texels = Texels {
+            section: section.texels(),
+            file: self.volume.path().map(Path::to_owned),
+            haze: section.haze.as_ref().map(|_| (opacity_distance, thickness)),
+            rest: (Same(rest.shell.clone()), rest.opacity_distance),
+        };
+        let (source, section, rest) = (self.volume.clone(), section.clone(), rest.clone());
+        (texels, VolumeWork { source, section, thickness, opacity_distance, rest })
     }
 
     /// Blames a texture that is too fine on who made it so.
@@ -199,6 +266,19 @@ impl Parts {
         Ok(Rest { shell, thickness: checked.file.shell.thickness.0, opacity_distance })
     }
 
+    /// Begins to make the volume of a scene that may come next, unless it is the one that there is. Of the sizes nobody is asked
+    /// until it comes.
+    pub(super) fn prefetch(&mut self, checked: &Checked<'_>, rest: &Rest) {
+        let (texels, work) = checked.volume_work(rest);
+        let is_it = |of: &Texels| *of == texels;
+        let is_there = self.volume.0.as_ref().is_some_and(|(of, _)| is_it(of));
+        if is_there || self.ahead.as_ref().is_some_and(|ahead| is_it(&ahead.of)) {
+            return;
+        }
+        let thread = std::thread::spawn(move || work.make(&|_| Ok(()), &|_| Ok(()), &mut |_| {}));
+        self.ahead = Some(Ahead { of: texels, thread });
+    }
+
     /// The scene; without a shell at `rest` its own is.
     ///
     /// # Errors
@@ -233,32 +313,17 @@ impl Parts {
         let thickness = file.shell.thickness.0;
         let opacity_distance = checked.opacity_distance();
         let own = Rest { shell: shell.clone(), thickness, opacity_distance };
-        let rest = rest.unwrap_or(&own);
         let section = file.volume.get_ref();
-        let texels = Texels {
-            section: section.texels(),
-            haze: section.haze.as_ref().map(|_| (opacity_distance, thickness)),
-            rest: (Same(rest.shell.clone()), rest.opacity_distance),
-        };
-        let volume = self.volume.get(texels, |_| {
+        let (texels, work) = checked.volume_work(rest.unwrap_or(&own));
+        let ahead = &mut self.ahead;
+        let volume = self.volume.get(texels, |texels| {
             progress.stage("loading the volume");
-            let mut volume = checked.volume.load(&admit, &|size| checked.resolve(&shell, size))?;
-            let distance = |explicit: Option<f64>, thickness: f64| {
-                explicit.unwrap_or(thickness / f64::from(volume.size[2]))
-            };
-            let texel = {
-                let distance = distance(rest.opacity_distance, rest.thickness);
-                texel_edges(&rest.shell, volume.size).map(|edge| edge / distance)
-            };
-            if let Some(HazeSection { alpha, colour }) = &section.haze {
-                let depth = -(-alpha.0).ln_1p() * distance(opacity_distance, thickness) / thickness;
-                Haze { colour: colour.0, depth }.fill(&mut volume);
+            if let Some(Ahead { thread, .. }) = ahead.take_if(|ahead| ahead.of == *texels) {
+                let made = thread.join().expect("making a volume does not panic");
+                stopwatch.lap("load.ahead");
+                return made;
             }
-            stopwatch.lap("load.volume");
-            progress.stage("filtering the volume");
-            let pyramid = Pyramid::build_with(volume, section.filter, texel);
-            stopwatch.lap("load.pyramid");
-            Ok(Arc::new(pyramid))
+            work.make(&admit, &|size| checked.resolve(&shell, size), &mut |stage| stopwatch.lap(stage))
         })?;
         let size = volume.levels[0].size;
         checked.resolve(&shell, size)?;

@@ -4,10 +4,11 @@ use std::path::{Path, PathBuf};
 
 use super::file::SceneFile;
 use super::load::Loaded;
+use super::numbered::Moment;
 use super::parts::{Checked, Parts, Rest};
 use super::text::Text;
 use super::timeline::{Timeline, Track};
-use super::{Sizes, files, load};
+use super::{Sizes, files, load, source};
 use crate::progress::Progress;
 use crate::{Error, Result};
 
@@ -53,8 +54,9 @@ impl Sequence {
         let sequence = Self { text, base_dir, timeline, tracks, parts: Parts::default(), rest: None };
         for frame in 1..=if sequence.tracks.is_empty() { 1 } else { timeline.frames } {
             let text = sequence.text_at(frame)?;
-            Checked::new(&text, &load::read(&text)?, &sequence.base_dir)?;
+            Checked::new(&text, &load::read(&text)?, &sequence.base_dir, sequence.moment(frame))?;
         }
+        source::check_volumes(file.volume.get_ref(), &sequence.base_dir)?;
         Ok(sequence)
     }
 
@@ -77,16 +79,31 @@ impl Sequence {
         admit: &dyn Fn(&Sizes) -> Result<()>,
     ) -> Result<Loaded> {
         self.check(frame)?;
-        if self.rest.is_none() && !self.tracks.is_empty() {
+        if self.rest.is_none() && self.timeline.frames > 1 {
             let text = self.text_at(1)?;
             let file = load::read(&text)?;
-            let checked = Checked::new(&text, &file, &self.base_dir)?;
+            let checked = Checked::new(&text, &file, &self.base_dir, self.moment(1))?;
             self.rest = Some(self.parts.rest(&checked, progress)?);
         }
         let text = self.text_at(frame)?;
         let file = load::read(&text)?;
-        let checked = Checked::new(&text, &file, &self.base_dir)?;
+        let checked = Checked::new(&text, &file, &self.base_dir, self.moment(frame))?;
         self.parts.build(&checked, self.rest.as_ref(), progress, admit)
+    }
+
+    /// Begins to load the volume of a frame that will be asked for after the one that was asked for last, on a thread of its own: two are
+    /// in memory then.
+    ///
+    /// # Errors
+    /// As [`Sequence::at`], but for the volume's: those are told when the frame is asked for.
+    pub fn prefetch(&mut self, frame: u32) -> Result<()> {
+        self.check(frame)?;
+        let Some(rest) = &self.rest else { return Ok(()) };
+        let text = self.text_at(frame)?;
+        let file = load::read(&text)?;
+        let checked = Checked::new(&text, &file, &self.base_dir, self.moment(frame))?;
+        self.parts.prefetch(&checked, rest);
+        Ok(())
     }
 
     /// All that makes a frame, for those who keep its picture.
@@ -97,7 +114,12 @@ impl Sequence {
         self.check(frame)?;
         let text = self.text_at(frame)?;
         let files = files::of(&text.plain(&OF_TIME)?, &self.base_dir);
-        let text = text.plain(&OF_TIME)? + "\n# At rest:\n" + &self.text_at(1)?.plain(&OF_TIME)?;
+        let Moment { time, loops } = self.moment(frame);
+        let text = format!(
+            "{}\n# At {time} s, loops: {loops}. At rest:\n{}",
+            text.plain(&OF_TIME)?,
+            self.text_at(1)?.plain(&OF_TIME)?
+        );
         Ok(FrameInputs { text, files })
     }
 
@@ -110,6 +132,10 @@ impl Sequence {
             message: format!("there is no frame {frame}: the scene has those from 1 to {frames}"),
             help: Some("the section [timeline] says how many `frames` there are".into()),
         })
+    }
+
+    fn moment(&self, frame: u32) -> Moment {
+        Moment { time: self.timeline.time(frame), loops: self.timeline.loops }
     }
 
     fn text_at(&self, frame: u32) -> Result<Text> {

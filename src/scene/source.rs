@@ -5,13 +5,32 @@ use std::path::{Path, PathBuf};
 use toml::Spanned;
 
 use super::file::{DensitySection, MeshSection, VolumeSection};
+use super::numbered::{self, Moment};
 use super::text::Text;
-use crate::Result;
 use crate::mesh::generate::Generator;
 use crate::mesh::projection::Projection;
 use crate::mesh::{Mesh, obj};
 use crate::volume::recipe::{self, Recipe};
 use crate::volume::{self, Interpretation, Volume};
+use crate::{Error, Result};
+
+/// Refuses a sequence of volumes that are not all of one size.
+///
+/// # Errors
+/// [`Error::Input`] with the file.
+pub(super) fn check_volumes(section: &VolumeSection, base_dir: &Path) -> Result<()> {
+    let Some(path) = &section.file else { return Ok(()) };
+    let Some(files) = numbered::files(&base_dir.join(path))? else { return Ok(()) };
+    let first = volume::size(&files[0])?;
+    for file in &files[1..] {
+        let size = volume::size(file)?;
+        if size != first {
+            let message = format!("has {size:?} texels, but {} has {first:?}", files[0].display());
+            return Err(Error::input(file, message).with_help("all volumes of a sequence must have one size"));
+        }
+    }
+    Ok(())
+}
 
 /// Where the mesh comes from.
 pub(super) enum MeshSource<'a> {
@@ -49,13 +68,23 @@ impl<'a> MeshSource<'a> {
 }
 
 /// Where the volume comes from.
+#[derive(Clone)]
 pub(super) enum VolumeSource {
     Recipe(Recipe),
     File(PathBuf, Interpretation),
 }
 
 impl VolumeSource {
-    pub(super) fn of(text: &Text, section: &Spanned<VolumeSection>, base_dir: &Path) -> Result<Self> {
+    /// Of a sequence, the file of that moment.
+    ///
+    /// # Errors
+    /// [`Error`](crate::Error) with the spot, or with the file.
+    pub(super) fn of(
+        text: &Text,
+        section: &Spanned<VolumeSection>,
+        base_dir: &Path,
+        moment: Moment,
+    ) -> Result<Self> {
         match section.get_ref() {
             VolumeSection {
                 recipe: Some(path), file: None, transfer: None, density: None, alpha: None, vary, ..
@@ -78,13 +107,29 @@ impl VolumeSource {
                     constant_alpha: alpha.map(|alpha| alpha.0 as f32),
                     transfer: transfer.clone(),
                 };
-                Ok(Self::File(base_dir.join(path), interpretation))
+                let path = base_dir.join(path);
+                let path = match numbered::files(&path)? {
+                    Some(mut files) => {
+                        let VolumeSection { rate, time, .. } = section.get_ref();
+                        files.swap_remove(moment.file(files.len(), rate.0, time.map(|time| time.0)))
+                    }
+                    None => path,
+                };
+                Ok(Self::File(path, interpretation))
             }
             _ => Err(text.error(
                 section.span(),
                 "[volume] needs either `recipe`, with or without `vary`, or `file` with what it may need of `transfer`, `density` \
                  and `alpha`",
             )),
+        }
+    }
+
+    /// The file that is read, if it is one.
+    pub(super) fn path(&self) -> Option<&Path> {
+        match self {
+            Self::Recipe(_) => None,
+            Self::File(path, _) => Some(path),
         }
     }
 

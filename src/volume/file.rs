@@ -34,6 +34,23 @@ pub fn read(path: &Path) -> Result<RawVolume> {
     }
 }
 
+/// The texels along u, v, w of the volume at `path`: of a KTX2 file from its header alone.
+///
+/// # Errors
+/// As [`read`].
+pub fn size(path: &Path) -> Result<[u32; 3]> {
+    if path.is_file() {
+        let mut magic = Vec::new();
+        let (file, _) = open(path)?;
+        let length = ktx2::MAGIC.len() as u64;
+        file.take(length).read_to_end(&mut magic).map_err(|error| unreadable(path, &error))?;
+        if magic == ktx2::MAGIC {
+            return ktx2_file::size(path);
+        }
+    }
+    read(path).map(|raw| raw.size)
+}
+
 /// What the volume at `path` is, read whole, so that its ranges are known; a recipe, a file whose name ends in `.toml`,
 /// is computed, and its colours are premultiplied.
 ///

@@ -41,6 +41,13 @@ pub(super) fn read_vectors(path: &Path) -> Result<([u32; 3], Vec<DVec3>)> {
     Ok((size, values.chunks_exact(channels as usize).map(vector).collect()))
 }
 
+/// The texels of level 0 along u, v, w, from the header.
+pub(super) fn size(path: &Path) -> Result<[u32; 3]> {
+    let header = Header::from_bytes(&Pieces::of(path)?.bytes(0)?)
+        .map_err(|error| Error::input(path, format!("has {error}")))?;
+    Ok([header.pixel_width, header.pixel_height, header.pixel_depth])
+}
+
 fn read_with_type(path: &Path) -> Result<(RawVolume, Sample)> {
     let mut file = Pieces::of(path)?;
     let header =

@@ -19,7 +19,7 @@ pub mod voxelize;
 
 pub use contact::contact_sheet;
 pub use directions::{DirectionLevel, Directions};
-pub use file::{info, is_recipe, read, read_or_make};
+pub use file::{info, is_recipe, read, read_or_make, size};
 pub use haze::Haze;
 pub use interpretation::Interpretation;
 pub use ktx2_file::{write_raw, write_volume};

@@ -215,10 +215,12 @@ fn fitted(size: [u32; 2], room: [u32; 2]) -> [u32; 2] {
 }
 
 fn png(path: &Path, image: &Image, backdrop: &Backdrop) -> Result<Vec<u8>> {
-    check_numbers(path, image)?;
+    // It is the picture that is at fault, not the file, which is not even opened: no reason to end the gallery.
+    let of_picture = |error: Error| Error::Device { message: error.to_string(), help: None };
+    check_numbers(path, image).map_err(of_picture)?;
     let mut png = Vec::new();
     write_png(&mut png, image, backdrop)
-        .map_err(|error| output::error(path, format!("cannot be encoded: {error}")))?;
+        .map_err(|error| of_picture(output::error(path, format!("cannot be encoded: {error}"))))?;
     Ok(png)
 }
 
@@ -229,6 +231,15 @@ fn milliseconds(start: Instant) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// So that it is one scene that is broken, and the others are kept.
+    #[test]
+    fn a_picture_that_is_no_number_is_no_fault_of_the_output() {
+        let image = Image { width: 1, height: 1, rgba: vec![[f32::NAN, 0.0, 0.0, 1.0]] };
+        let error = png("a.png".as_ref(), &image, &Backdrop::default()).unwrap_err();
+        assert!(matches!(error, Error::Device { .. }), "{error:?}");
+        assert!(error.to_string().contains("a.png: pixel (0, 0) is not a number"), "{error}");
+    }
 
     #[test]
     fn what_is_compared_keeps_its_shape() {

@@ -302,6 +302,9 @@ impl Method for Shell {
             &self.interrupt,
         )?;
         watch.lap("left");
+        if shadows.is_some() {
+            check_shadows(&rgba)?;
+        }
         let mut report = self.report(&sorted, &seen, &rgba);
         report.skipped.extend(kept);
         if keeps_shadows && shadows.is_some() {
@@ -397,6 +400,20 @@ impl Method for Shell {
     fn forget(&mut self) {
         self.last = None;
     }
+}
+
+/// Pixels that are lit through more of the shell than a light's picture resolves are not finite: see `glsl/include/shadows.glsl`.
+fn check_shadows(rgba: &[[f32; 4]]) -> Result<()> {
+    let unresolved = rgba.iter().filter(|pixel| !pixel.iter().all(|x| x.is_finite())).count();
+    if unresolved == 0 {
+        return Ok(());
+    }
+    Err(Error::Device {
+        message: format!(
+            "{unresolved} pixels are lit through more of the shell than a pixel of a light's picture resolves"
+        ),
+        help: Some("make shading.shadow_size larger, or shell.uv_scale smaller".into()),
+    })
 }
 
 /// Whether all that lights see of two scenes is alike, if shell, volume and solids are.

@@ -13,13 +13,13 @@ use rayon::prelude::*;
 
 use super::seen::{Cell, Tile};
 use super::{ViewConstants, constants_of_volume};
+use crate::Result;
 use crate::gpu::{
     Batch, Buffer, Draw, Gpu, Keeps, Pipeline, PipelineInfo, Sampled, Target, Texture3d, draw, shaders,
 };
 use crate::progress::{Interrupt, Progress};
 use crate::scene::{LightView, March, Scene};
 use crate::shell::Shell;
-use crate::{Error, Result};
 
 /// `LightPicture` of `glsl/include/picture.glsl`: see there for each member.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Pod, Zeroable)]
@@ -49,8 +49,12 @@ pub struct Blocker {
 /// `CURVE_IMAGES` of `glsl/include/curve.glsl`.
 const CURVE_IMAGES: usize = 4;
 
-/// The side of a [`Tile`] in pixels.
+/// The side of a [`Tile`] in pixels: a power of two. Where many tetrahedra are seen in one, it is smaller.
 const TILE: u32 = 16;
+
+/// Tetrahedra in a tile from which on it is too large, unless it is a pixel already: every pixel of it tries them all, a few times,
+/// and gives up after `MOST_PASSES` of `glsl/include/gather.glsl`.
+const CROWD: usize = 4096;
 
 /// Depth before which a light sees nothing, as a part of the depth of its picture: what it stands in is not drawn by infinite
 /// slopes.
@@ -115,13 +119,8 @@ impl Shadows {
         let rows = (views.len() as u32).div_ceil(columns);
         let size = [columns, rows].map(|pictures| pictures * side);
         let target = |images, nearest| {
-            Target::sampled(gpu, "the shadows", size, images, nearest).map_err(|error| match error {
-                Error::Device { message, .. } => {
-                    let help =
-                        Some("make shading.shadow_size smaller, or let fewer lights cast shadows".into());
-                    Error::Device { message, help }
-                }
-                other => other,
+            Target::sampled(gpu, "the shadows", size, images, nearest).map_err(|error| {
+                error.with_help("make shading.shadow_size smaller, or let fewer lights cast shadows")
             })
         };
         let mut shadows = Self {
@@ -235,7 +234,7 @@ impl Shadows {
             storage_buffers: &[0, 1, 2, 6],
             textures: &[8],
             push_constant_bytes: size_of::<ViewConstants>() as u32,
-            keeps: Keeps::Blend,
+            keeps: Keeps::Last,
         };
         let pipeline = Pipeline::new(gpu, &self.curves, &info)?;
         let tiles = drawn.tiles.len() as u32;
@@ -264,28 +263,19 @@ impl Shadows {
         // Members that come about nearest first are sorted quickly in every pixel.
         found.par_sort_by(|a, b| a.1.nearest.total_cmp(&b.1.nearest));
         let first_cell = drawn.cells.len() as u32;
-        let across = self.side.div_ceil(TILE);
-        let mut inside: Vec<(u32, u32)> = Vec::new(); // tile, cell
-        for (cell, (_, bounds, _)) in (first_cell..).zip(&found) {
-            let tiles = |axis: usize| {
-                // A pixel more on either side than rounding can be off.
-                let tile = |pixel: f64| pixel.clamp(0.0, f64::from(self.side) - 1.0) as u32 / TILE;
-                tile(bounds.low[axis] - 1.0)..=tile(bounds.high[axis] + 1.0)
-            };
-            inside.extend(tiles(1).flat_map(|y| tiles(0).map(move |x| (y * across + x, cell))));
-        }
+        let (tile_side, inside) = self.tiled(first_cell, &found);
+        let across = self.side.div_ceil(tile_side);
         for (cell, _, minified) in found {
             drawn.cells.push(cell);
             drawn.minified |= minified;
         }
-        inside.par_sort_unstable();
         let [width, height] = self.curves.size().map(f64::from);
         let corner =
             [index as u32 % self.columns, index as u32 / self.columns].map(|place| place * self.side);
         for tile in inside.chunk_by(|a, b| a.0 == b.0) {
             let first = drawn.members.len() as u32;
             drawn.members.extend(tile.iter().map(|(_, cell)| cell));
-            let [x, y] = [tile[0].0 % across * TILE, tile[0].0 / across * TILE];
+            let [x, y] = [tile[0].0 % across * tile_side, tile[0].0 / across * tile_side];
             let clip = |axis: usize, pixel: u32, size: f64| {
                 (2.0 * f64::from(corner[axis] + pixel.min(self.side)) / size - 1.0) as f32
             };
@@ -293,13 +283,36 @@ impl Shadows {
                 bounds: [
                     clip(0, x, width),
                     clip(1, y, height),
-                    clip(0, x + TILE, width),
-                    clip(1, y + TILE, height),
+                    clip(0, x + tile_side, width),
+                    clip(1, y + tile_side, height),
                 ],
                 members: [first, drawn.members.len() as u32],
                 picture: index as u32,
                 padding: 0,
             });
+        }
+    }
+
+    /// The tiles of a picture, and the cells that are seen in each, as sorted pairs of tile and cell; and the side of a tile.
+    fn tiled(&self, first_cell: u32, found: &[(Cell, Bounds, bool)]) -> (u32, Vec<(u32, u32)>) {
+        let mut tile_side = TILE;
+        loop {
+            let across = self.side.div_ceil(tile_side);
+            let mut inside: Vec<(u32, u32)> = Vec::new(); // tile, cell
+            for (cell, (_, bounds, _)) in (first_cell..).zip(found) {
+                let tiles = |axis: usize| {
+                    // A pixel more on either side than rounding can be off.
+                    let tile = |pixel: f64| pixel.clamp(0.0, f64::from(self.side) - 1.0) as u32 / tile_side;
+                    tile(bounds.low[axis] - 1.0)..=tile(bounds.high[axis] + 1.0)
+                };
+                inside.extend(tiles(1).flat_map(|y| tiles(0).map(move |x| (y * across + x, cell))));
+            }
+            inside.par_sort_unstable();
+            let largest = inside.chunk_by(|a, b| a.0 == b.0).map(<[_]>::len).max().unwrap_or(0);
+            if largest <= CROWD || tile_side == 1 {
+                return (tile_side, inside);
+            }
+            tile_side /= 2;
         }
     }
 

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use super::Pattern;
 use super::grid::{Grid, premultiplied, smoothstep};
 use super::keys::keys;
-use super::noise::Octaves;
+use super::noise::{Octaves, turned};
 use crate::value::Colour;
 
 keys! {
@@ -24,6 +24,8 @@ keys! {
         scale: u32 = 2, 1..=64;
         /// How many octaves of noise give them their shape.
         octaves: u32 = 4, 1..=10;
+        /// Where the clouds are in their motion; 1 is 0 again.
+        phase: f32 = 0.0, 0.0..=1.0;
         /// Billows along a tile's side.
         billows: u32 = 6, 1..=256;
         /// How deep the billows cut into the clouds.
@@ -66,7 +68,7 @@ impl Clouds {
         let narrowing = 0.6 * smoothstep(0.2, 0., level) + 1.1 * level * level;
         let finest = grid.finest_noise();
         let shape = Octaves { cells: self.scale, count: self.octaves, gain: 0.45, finest };
-        let body = 1.6 * shape.gradient(position, seed) + self.coverage - 0.5 - narrowing;
+        let body = 1.6 * shape.flowing(position, seed, turned(self.phase)) + self.coverage - 0.5 - narrowing;
         // The billows add and take at most this much.
         let billowing = 0.9 * self.billowing;
         if body + 0.5 * billowing <= 0. {

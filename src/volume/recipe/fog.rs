@@ -5,7 +5,7 @@ use glam::Vec3;
 use super::Pattern;
 use super::grid::{Grid, premultiplied, smoothstep};
 use super::keys::keys;
-use super::noise::{Octaves, gradient};
+use super::noise::{Octaves, flowing, turned};
 use crate::value::Colour;
 
 keys! {
@@ -21,6 +21,8 @@ keys! {
         contrast: f32 = 0.8, 0.0..=1.0;
         /// How far the swirls are drawn out into wisps, in their own widths.
         swirl: f32 = 0.5, 0.0..=2.0;
+        /// Where the swirls are in their motion; 1 is 0 again.
+        phase: f32 = 0.0, 0.0..=1.0;
         /// How high the fog reaches, as a share of the shell's thickness.
         reach: f32 = 0.95, 0.05..=1.0;
         /// Colour where the fog is thick.
@@ -33,7 +35,8 @@ keys! {
 impl Fog {
     /// How far the fog at a point was blown, in tile widths.
     fn wind(&self, position: Vec3, seed: u32) -> Vec3 {
-        let noise = |axis| gradient(position * self.scale as f32, [self.scale; 2], seed ^ axis);
+        let turned = turned(self.phase);
+        let noise = |axis| flowing(position * self.scale as f32, [self.scale; 2], seed ^ axis, turned);
         Vec3::new(noise(0xa1), noise(0xa2), noise(0xa3)) * self.swirl / self.scale as f32
     }
 }
@@ -44,7 +47,7 @@ impl Pattern for Fog {
             Octaves { cells: self.scale, count: self.octaves, gain: 0.5, finest: grid.finest_noise() };
         grid.fill(texels, |position| {
             let level = position.z / grid.height;
-            let noise = swirls.gradient(position + self.wind(position, seed), seed);
+            let noise = swirls.flowing(position + self.wind(position, seed), seed, turned(self.phase));
             // The fog's ceiling rises and falls with the noise, so that its top is no plane.
             let ceiling = self.reach * (1. - 0.45 * self.contrast * (0.5 - 1.2 * noise).clamp(0., 1.));
             let thinning = smoothstep(ceiling, 0., level);

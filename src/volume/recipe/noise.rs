@@ -8,7 +8,7 @@
 //!
 //! A lattice has `period` cells a tile along x and y, where it wraps, and does not repeat along z.
 
-use glam::{IVec3, Vec3};
+use glam::{IVec3, Vec2, Vec3};
 
 /// 32 well-mixed bits for a lattice point.
 pub(super) fn hash(point: IVec3, seed: u32) -> u32 {
@@ -41,6 +41,18 @@ fn wrap(cell: IVec3, period: [i32; 2]) -> IVec3 {
 /// Gradient noise at a point in lattice units, where a tile has `period` cells along x and y (each at
 /// least 1). Smooth (C2), 0 at lattice points, within +-1.04.
 pub(super) fn gradient(point: Vec3, period: [u32; 2], seed: u32) -> f32 {
+    flowing(point, period, seed, Vec2::X)
+}
+
+/// A direction that has turned by `phase` of a circle from (1, 0); exactly that where `phase` is whole.
+pub(super) fn turned(phase: f32) -> Vec2 {
+    let phase = phase.fract();
+    if phase == 0. { Vec2::X } else { Vec2::from_angle(std::f32::consts::TAU * phase) }
+}
+
+/// The same whose gradients have [`turned`], each in its own plane: noise that swirls in place, and comes back to itself (Ken Perlin,
+/// Fabrice Neyret, "Flow Noise", SIGGRAPH 2001).
+pub(super) fn flowing(point: Vec3, period: [u32; 2], seed: u32, turned: Vec2) -> f32 {
     // The 12 edges of a cube; four of them twice, so that four bits choose one without a bias in z.
     const GRADIENTS: [[f32; 3]; 16] = [
         [1., 1., 0.],
@@ -67,7 +79,17 @@ pub(super) fn gradient(point: Vec3, period: [u32; 2], seed: u32) -> f32 {
     let far = wrap(cell + IVec3::new(1, 1, 0), period) + IVec3::Z;
     let corner = |x: i32, y: i32, z: i32| {
         let lattice = IVec3::new([near.x, far.x][x as usize], [near.y, far.y][y as usize], near.z + z);
-        let slope = Vec3::from(GRADIENTS[(hash(lattice, seed) & 15) as usize]);
+        let gradient = Vec3::from(GRADIENTS[(hash(lattice, seed) & 15) as usize]);
+        // A quarter turn of (a, b) in the two axes that the gradient has is (-b, a).
+        let [a, b, c] = gradient.to_array();
+        let quarter = if c == 0. {
+            Vec3::new(-b, a, 0.)
+        } else if b == 0. {
+            Vec3::new(-c, 0., a)
+        } else {
+            Vec3::new(0., -c, b)
+        };
+        let slope = turned.x * gradient + turned.y * quarter;
         slope.dot(within - IVec3::new(x, y, z).as_vec3())
     };
     let fade = within * within * within * (within * (within * 6. - 15.) + 10.);
@@ -112,6 +134,11 @@ impl Octaves {
     /// Fractal gradient noise at a point in tile widths; within +-1.04, mostly within +-0.5.
     pub fn gradient(&self, point: Vec3, seed: u32) -> f32 {
         self.sum(seed, |cells, seed| gradient(point * cells as f32, [cells; 2], seed))
+    }
+
+    /// Fractal gradient noise whose gradients have [`turned`].
+    pub fn flowing(&self, point: Vec3, seed: u32, turned: Vec2) -> f32 {
+        self.sum(seed, |cells, seed| flowing(point * cells as f32, [cells; 2], seed, turned))
     }
 
     /// Fractal cellular noise at a point in tile widths: 1 at the features, falling to 0 between them.
@@ -192,6 +219,17 @@ mod tests {
         fn gradient_noise_keeps_its_bounds(x in 0f32..8., y in 0f32..8., z in -8f32..8., seed: u32) {
             prop_assert!(gradient(Vec3::new(x, y, z), [8, 8], seed).abs() <= 1.04);
             prop_assert_eq!(gradient(Vec3::new(x, y, z).floor(), [8, 8], seed), 0.);
+        }
+
+        /// As the lattice does; and a circle is a circle.
+        #[test]
+        fn flowing_noise_repeats_in_space_and_in_time(phase in 0.05f32..0.95, y in 0f32..5., z in -3f32..3., seed: u32) {
+            let at = |x: f32, phase: f32| flowing(Vec3::new(x, y, z), [5, 5], seed, turned(phase));
+            prop_assert_eq!(at(0., phase), at(5., phase));
+            prop_assert_eq!(at(0.3, 0.), gradient(Vec3::new(0.3, y, z), [5, 5], seed));
+            prop_assert_eq!(at(0.3, 1.), at(0.3, 0.));
+            // Opposite gradients, opposite noise: the two halves of a circle, to the rounding of its points.
+            prop_assert!((at(0.3, phase) + at(0.3, phase + 0.5)).abs() < 1e-5);
         }
 
         /// The cells that are passed over hold nothing nearer.
