@@ -53,6 +53,15 @@ struct Solid {
     node: usize,
 }
 
+/// A vertex: its id, and where it is.
+type Point<'a> = (u32, &'a Coord3D<f64>);
+
+impl Solid {
+    fn point(&self, k: usize) -> Point<'_> {
+        (self.vertices[k], &self.corners[k])
+    }
+}
+
 impl Bounded<f64, 3> for Solid {
     fn aabb(&self) -> Aabb<f64, 3> {
         self.bounds
@@ -112,36 +121,36 @@ const FACES: [[usize; 3]; 4] = [[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]];
 const EDGES: [[usize; 2]; 6] = [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]];
 
 fn interiors_meet(one: &Solid, other: &Solid) -> bool {
-    let faces = |of: &Solid| FACES.map(|face| face.map(|k| (of.vertices[k], of.corners[k])));
-    if faces(one).into_iter().chain(faces(other)).any(|plane| separates(plane, one, other)) {
-        return false;
-    }
-    let edges = |of: &Solid| EDGES.map(|edge| edge.map(|k| (of.vertices[k], of.corners[k])));
-    let mixed = |of: &Solid, beyond: &Solid| {
-        edges(of).into_iter().any(|[p, q]| {
-            (0..4).any(|k| separates([p, q, (beyond.vertices[k], beyond.corners[k])], one, other))
-        })
+    // Most pairs are neighbours, which a face separates.
+    let face = |of: &Solid, k: usize| separates(FACES[k].map(|corner| of.point(corner)), one, other);
+    let mixed = |of: &Solid, beyond: &Solid, [p, q]: [usize; 2]| {
+        (0..4).any(|k| separates([of.point(p), of.point(q), beyond.point(k)], one, other))
     };
-    !mixed(one, other) && !mixed(other, one)
+    !(0..4).any(|k| face(one, k))
+        && !(0..4).any(|k| face(other, k))
+        && !EDGES.iter().any(|&edge| mixed(one, other, edge))
+        && !EDGES.iter().any(|&edge| mixed(other, one, edge))
 }
 
 /// Whether the plane through three points has the two on different sides; three on a line have no plane.
-fn separates(plane: [(u32, Coord3D<f64>); 3], one: &Solid, other: &Solid) -> bool {
-    match side(plane, one) {
-        Some(first) => side(plane, other).is_some_and(|second| second != first),
+fn separates(plane: [Point<'_>; 3], one: &Solid, other: &Solid) -> bool {
+    match side(&plane, one) {
+        Some(first) => side(&plane, other).is_some_and(|second| second != first),
         None => false,
     }
 }
 
 /// Whether all is on the positive side; `None` for a plane that cuts, or has all in it.
-fn side(plane @ [(_, p), (_, q), (_, r)]: [(u32, Coord3D<f64>); 3], of: &Solid) -> Option<bool> {
+fn side(plane: &[Point<'_>; 3], of: &Solid) -> Option<bool> {
+    let [p, q, r] = plane;
     let mut found = None;
-    for (id, &corner) in of.vertices.iter().zip(&of.corners) {
+    for k in 0..4 {
+        let (id, corner) = of.point(k);
         // Exactly zero, without the exact arithmetic.
-        if plane.iter().any(|(on, _)| on == id) {
+        if [p.0, q.0, r.0].contains(&id) {
             continue;
         }
-        let sign = orient3d(p, q, r, corner);
+        let sign = orient3d(*p.1, *q.1, *r.1, *corner);
         if sign == 0.0 {
             continue;
         }
