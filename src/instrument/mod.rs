@@ -7,6 +7,7 @@
 pub mod faults;
 pub mod fold;
 pub mod heatmap;
+mod motion;
 pub mod overlap;
 pub mod page;
 mod plot;
