@@ -34,6 +34,7 @@ pub mod film;
 pub mod frame;
 pub mod gpu;
 mod input;
+pub mod instrument;
 pub mod mesh;
 pub mod method;
 pub mod metric;

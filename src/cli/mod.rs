@@ -3,6 +3,7 @@
 //! Standard output carries the result alone, standard error progress, warnings and errors.
 
 mod accuracy;
+mod animate_check;
 mod bench;
 mod devices;
 mod diff;
@@ -26,7 +27,8 @@ Exit codes:
   0    done
   1    diff: the images differ by more than --threshold; stress: a case fails;
        render --verify: the error is above --max-error;
-       gallery: a scene's error is above its bound
+       gallery: a scene's error is above its bound;
+       animate-check: a frame has a fault
   2    the request makes no sense (an unknown option, a bad -D)
   3    an input file is missing, damaged or means something impossible
   4    no usable Vulkan device
@@ -70,6 +72,7 @@ enum Command {
     Bench(bench::Arguments),
     Gallery(gallery::Arguments),
     Stress(stress::Arguments),
+    AnimateCheck(animate_check::Arguments),
 }
 
 /// Runs what the arguments of this process ask for.
@@ -91,6 +94,7 @@ pub fn run() -> ExitCode {
         Command::Bench(arguments) => bench::run(arguments, talk).map(|()| ExitCode::SUCCESS),
         Command::Gallery(arguments) => gallery::run(arguments, talk),
         Command::Stress(arguments) => stress::run(arguments, talk),
+        Command::AnimateCheck(arguments) => animate_check::run(arguments, talk),
     };
     done.unwrap_or_else(|error| {
         let code = match error {

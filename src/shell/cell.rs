@@ -11,7 +11,7 @@ use robust::{Coord3D, orient3d};
 use super::{Cell, FACES};
 
 /// Six times the signed volume, with the exact sign: `det(v1-v0, v2-v0, v3-v0)`.
-pub(super) fn determinant([v0, v1, v2, v3]: [DVec3; 4]) -> f64 {
+pub(crate) fn determinant([v0, v1, v2, v3]: [DVec3; 4]) -> f64 {
     let [v0, v1, v2, v3] = [v0, v1, v2, v3].map(|v| Coord3D { x: v.x, y: v.y, z: v.z });
     orient3d(v1, v2, v3, v0)
 }

@@ -17,7 +17,7 @@ use std::ops::Add;
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::{Cell, Health, SLIVER_QUALITY, ShellOptions, Topology, extrude};
+use super::{Cell, Health, SLIVER_QUALITY, Shell, ShellOptions, Topology, cell, extrude};
 use crate::mesh::Mesh;
 
 /// How many tetrahedra have which fault.
@@ -83,6 +83,18 @@ pub(super) fn overlap_risk_vertices(mesh: &Mesh, options: &ShellOptions, directi
     at_risk.par_iter().filter(|&&risky| risky).count() as u64
 }
 
+impl Shell {
+    /// Six times the signed volume of tetrahedron `t`, in cubic world units, with the exact sign: negative where it is inverted.
+    pub fn determinant(&self, t: usize) -> f64 {
+        cell::determinant(self.vertices_of(t))
+    }
+
+    /// Shape quality of tetrahedron `t`, 0 (flat) to 1 (regular): `6 sqrt(2) |V| / l_rms^3`. See [`SLIVER_QUALITY`].
+    pub fn quality(&self, t: usize) -> f64 {
+        quality(self.vertices_of(t), self.determinant(t))
+    }
+}
+
 /// Shape quality, 0 (flat) to 1 (regular), given six times the signed volume.
 fn quality([a, b, c, d]: [DVec3; 4], determinant: f64) -> f64 {
     let edges = [b - a, c - a, d - a, c - b, d - b, d - c];
@@ -98,7 +110,6 @@ mod tests {
 
     use super::*;
     use crate::mesh::generate::{Generator, Sphere, Torus};
-    use crate::shell::{Shell, cell};
 
     const REGULAR: [DVec3; 4] = [
         DVec3::new(1.0, 1.0, 1.0),

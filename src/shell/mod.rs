@@ -26,6 +26,7 @@ mod topology;
 
 use std::sync::Arc;
 
+pub(crate) use cell::determinant;
 pub use frames::{FrameKind, Frames};
 use glam::{DAffine3, DMat3, DVec2, DVec3, DVec4};
 

@@ -2,7 +2,7 @@
 
 pub mod csv;
 pub mod html;
-pub(super) mod picture;
+pub(crate) mod picture;
 mod plot;
 
 /// Names of errors in the order in which they are shown, and what people call them. Others follow by their own name.
