@@ -130,6 +130,11 @@ impl Model {
 }
 
 impl Shading {
+    /// Whether any light does.
+    pub fn casts_shadows(&self) -> bool {
+        self.lights.iter().any(|light| light.shadow)
+    }
+
     /// The largest of red, green and blue by which light multiplies a colour, and what it may add to that: no point of the
     /// scene is brighter than `colour * factor + added`.
     pub fn bounds(&self) -> (f64, f64) {

@@ -99,7 +99,9 @@ impl Shadows {
         progress: &dyn Progress,
         interrupt: &Interrupt,
     ) -> Result<Option<Self>> {
-        let Some(shading) = &scene.shading else { return Ok(None) };
+        let Some(shading) = scene.shading.as_ref().filter(|shading| shading.casts_shadows()) else {
+            return Ok(None);
+        };
         let (centre, radius) = scene.bounds();
         let mut views = Vec::new();
         let mut ranges = Vec::new();
@@ -109,9 +111,6 @@ impl Shadows {
                 views.extend(LightView::of(light, centre, radius, shading.shadow_size));
             }
             ranges.push([first, views.len() as u32]);
-        }
-        if views.is_empty() {
-            return Ok(None);
         }
         progress.stage("drawing shadows");
         let side = shading.shadow_size;
