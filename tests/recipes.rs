@@ -170,6 +170,29 @@ fn a_chain_has_no_end() {
     assert!(seam(&volume, 0, 96) > 1.5, "a border in the wrong place is not seen");
 }
 
+/// However small its links are, a chain has all of them: the parts of a slice that are drawn together may hold several periods.
+#[test]
+fn a_chain_of_small_links_misses_none() {
+    let (links, texels) = (32, 4); // pairs of links on the tile, and texels a pair
+    // The height at which so many fit in a row.
+    let text = "recipe = \"figure\"\nfigure = \"chain\"\nheight = 0.01165";
+    let size = [links * texels, 1024, 4];
+    let volume = recipe::parse("test", text).unwrap().build_with_size(size).unwrap();
+    let row = |u: u32| -> f32 {
+        let all = (0..size[1]).flat_map(|v| (0..size[2]).map(move |w| [u, v, w]));
+        all.map(|at| volume.texel(at)[3]).sum()
+    };
+    let rows: Vec<f32> = (0..size[0]).map(row).collect();
+    for (u, row) in rows.iter().enumerate() {
+        // Of f32 places on the tile alone.
+        let first = rows[u % texels as usize];
+        assert!(
+            (row - first).abs() <= 1e-3 * first && *row > 0.0,
+            "{row} at {u}, {first} in the first pair: {rows:?}"
+        );
+    }
+}
+
 /// Cut off by the border of the tile and continued on its other side is the same as moved.
 #[test]
 fn figures_go_on_across_the_border() {

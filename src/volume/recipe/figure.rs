@@ -187,6 +187,7 @@ impl Figures {
         let Vec3 { x: u, y: v, .. } = placed.foot;
         let columns: Vec<_> = grid.between(0, u - reach.x, u + reach.x).collect();
         let rows: Vec<_> = grid.between(1, v - reach.y, v + reach.y).collect();
+        let period = self.keys.figure.0.period();
         let within = |x: f32, y: f32| placed.turn * (Vec3::new(x, y, z) - placed.foot).as_dvec3();
         for (rows, columns) in
             rows.chunks(BLOCK).flat_map(|rows| columns.chunks(BLOCK).map(move |columns| (rows, columns)))
@@ -195,17 +196,22 @@ impl Figures {
             let (first, last) = (corner(0, 0), corner(columns.len() - 1, rows.len() - 1));
             let radius = 0.5 * first.distance(last) + 2. * edge;
             let middle = placed.origin + 0.5 * (first + last);
-            // A chain's blocks are taken to where its links are.
-            let along = self.keys.figure.0.period().map_or(0., |period| period * (middle.x / period).floor());
-            let middle = middle - along * DVec3::X;
-            let near = self.sculpture.around(middle, radius);
+            let around = |reach: f64| match period {
+                // A block may span many periods; the few links of one and its neighbours are all that a point meets.
+                Some(_) => self.sculpture.clone(),
+                None => self.sculpture.around(middle, reach),
+            };
+            let near = around(radius);
             if near.is_empty() {
                 continue;
             }
-            let surroundings = self.sculpture.around(middle, radius + self.sculpture.horizon());
+            let surroundings = around(radius + self.sculpture.horizon());
             for &(j, y) in rows {
                 for &(i, x) in columns {
-                    let point = placed.origin + within(x, y) - along * DVec3::X;
+                    let mut point = placed.origin + within(x, y);
+                    if let Some(period) = period {
+                        point.x = point.x.rem_euclid(period);
+                    }
                     if near.field(point) > 2. * edge {
                         continue;
                     }
