@@ -10,13 +10,15 @@ use std::sync::Arc;
 
 use common::Watched;
 use glam::DVec3;
+use mesoshell::frame::Image;
 use mesoshell::mesh::Mesh;
 use mesoshell::mesh::generate::{Generator, Sphere};
 use mesoshell::metric;
-use mesoshell::scene::{Scene, View};
+use mesoshell::scene::{Emission, Light, Model, Scene, Shading, Solid, Source, View};
 use mesoshell::shell::{Cell, Shell, ShellOptions};
 use mesoshell::stress::compare::excess;
-use mesoshell::stress::scenes::{PAINTS, Paint, in_turns, loose, painted, ring, view};
+use mesoshell::stress::scenes::{PAINTS, Paint, columns, in_turns, loose, painted, ring, view};
+use mesoshell::volume::Directions;
 
 fn scene(shell: Shell, paints: &[Paint], view: View) -> Arc<Scene> {
     Arc::new(painted(shell, paints, 0.1, view))
@@ -101,6 +103,53 @@ fn views_one_after_another_are_drawn_as_each_alone() {
         drawn.push(frame.report.counts["tetrahedra_drawn"]);
     }
     assert!(drawn[0] < drawn[1] && drawn[2] < drawn[1], "no buffer had to grow: {drawn:?}");
+}
+
+/// Bars that hide one another in turns, a ball that they hide and are hidden by, and the shadows of all on all.
+#[test]
+fn a_cycle_around_a_ball_in_the_sun_agrees_with_the_reference() {
+    let view = view(DVec3::new(0.0, 0.0, 8.0), DVec3::ZERO, 24.0, 0.01, 160);
+    let mut scene = painted(ring(3), &PAINTS, 0.1, view);
+    let mut ball = Generator::Sphere(Sphere { radius: 0.4, segments: 64, rings: 32 }).build().unwrap();
+    ball.positions.iter_mut().for_each(|position| *position += DVec3::new(0.2, 0.1, 0.0));
+    let colour = DVec3::new(0.9, 0.8, 0.3);
+    scene.solids = [Solid { origin: "a test".into(), mesh: ball.into(), colour, texture: None }].into();
+    let sun = Source::Directional { towards: DVec3::new(0.9, 0.3, 0.6).normalize() };
+    scene.shading = Some(Shading {
+        model: Model::Surface,
+        ambient: DVec3::splat(0.1),
+        diffuse: 1.0,
+        specular: 0.0,
+        shininess: 1.0,
+        emission: Emission { glow: 0.0, from: 0.0 },
+        shadow_size: 4096,
+        lights: vec![Light { source: sun, colour: DVec3::splat(2.0), shadow: true }],
+        directions: Directions::normals(&scene.volume.levels[0]).into(),
+    });
+    let render = |scene: &Scene| Watched::prepare("shell", &Arc::new(scene.clone())).render(&view);
+    let exact = Watched::prepare("reference", &Arc::new(scene.clone())).render(&view).image;
+    let frame = render(&scene);
+    assert!(frame.report.counts["cycles"] > 0);
+    let rmse = |image: &Image| metric::compare(image, &exact).unwrap().rmse;
+    let error = rmse(&frame.image);
+    println!("RMSE {error:e}");
+    // Half of the bound of any scene with shadows, whose edges are those of pixels: see docs/gallery.md.
+    assert!(error < 5e-3, "{error}");
+    let changes: [(&str, fn(&mut Scene)); 3] = [
+        ("the ball", |scene| scene.solids = [].into()),
+        ("the shadows", |scene| scene.shading.as_mut().unwrap().lights[0].shadow = false),
+        ("the order of two bars' paints", |scene| {
+            let [a, b, c] = PAINTS;
+            scene.volume = Arc::new(columns(&[b, a, c]));
+        }),
+    ];
+    for (name, change) in changes {
+        let mut changed = scene.clone();
+        change(&mut changed);
+        let apart = rmse(&render(&changed).image);
+        println!("{name}: {apart:e}");
+        assert!(apart > 3.0 * error, "{name} makes no difference: {apart}");
+    }
 }
 
 /// Two shells through one another, the second shifted by its own radius.
