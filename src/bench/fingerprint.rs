@@ -117,7 +117,7 @@ fn seen(mut builder: Builder, scene: &Scene, view: &View, levels: &[Volume]) -> 
         };
         builder = builder.bytes(quantity.as_bytes()).numbers(&level.size).numbers(&level.texels);
     }
-    for Solid { mesh, colour, texture } in scene.solids.iter() {
+    for Solid { mesh, colour, texture, origin: _ } in scene.solids.iter() {
         let levels = texture.as_ref().map_or(&[][..], |texture| &texture.levels);
         builder = builder
             .numbers(&mesh.positions)
@@ -178,6 +178,7 @@ fn lit(builder: Builder, scene: &Scene, shading: &Shading, levels: &[DirectionLe
 
 #[cfg(test)]
 pub(crate) mod tests {
+    use std::path::PathBuf;
     use std::sync::Arc;
 
     use glam::DVec3;
@@ -308,7 +309,8 @@ pub(crate) mod tests {
     fn solid() -> Scene {
         let texture = Volume::new([2, 1, 1], vec![[0.5, 0.25, 0.0, 1.0]; 2]).unwrap();
         let texture = Some(Arc::new(Pyramid::build(texture)));
-        let solid = Solid { mesh: Arc::new(Mesh::triangle()), colour: DVec3::ONE, texture };
+        let mesh = Arc::new(Mesh::triangle());
+        let solid = Solid { origin: PathBuf::new(), mesh, colour: DVec3::ONE, texture };
         Scene { solids: [solid].into(), ..scene() }
     }
 

@@ -16,6 +16,7 @@
 //! triangle has two sides, alike: `n` is turned round where the eye is behind the triangle, and a light on the other side of the
 //! triangle than the eye, or in its plane, gives nothing.
 
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use glam::{DMat2, DVec2, DVec3};
@@ -26,6 +27,8 @@ use crate::volume::Pyramid;
 /// An opaque mesh of one material.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Solid {
+    /// The file of its texture, or that which names that, if it has any; for messages.
+    pub origin: PathBuf,
     /// World space.
     pub mesh: Arc<Mesh>,
     /// Linear red, green, blue, each at least 0; multiplies the texture.
@@ -82,7 +85,8 @@ mod tests {
         let texels = vec![[1.0; 4]; 32];
         let texture = Pyramid::build(Volume::new([8, 4, 1], texels).unwrap());
         let texture = Some(Arc::new(texture));
-        let mut solid = Solid { mesh: Arc::new(Mesh::triangle()), colour: DVec3::ONE, texture };
+        let mesh = Arc::new(Mesh::triangle());
+        let mut solid = Solid { origin: PathBuf::new(), mesh, colour: DVec3::ONE, texture };
         assert!((solid.texels_per_unit(0) - 8.0).abs() < 1e-12);
         Arc::make_mut(&mut solid.mesh).positions[2] = 0.1 * DVec3::Y;
         assert!((solid.texels_per_unit(0) - 40.0).abs() < 1e-12);

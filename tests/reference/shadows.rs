@@ -4,6 +4,7 @@
 //! `C = 1/4 light * integral of sigma exp(-sigma s) E ds`, where `E` is `exp(-sigma times the path from the point out of the slab)`.
 
 use glam::DVec3;
+use mesoshell::mesh::Mesh;
 use mesoshell::mesh::generate::{Generator, Plane, Sphere};
 use mesoshell::reference::{Reference, SHADOW_TOLERANCE, TOLERANCE};
 use mesoshell::scene::{Light, LightView, Scene, Solid, Source, View};
@@ -195,15 +196,17 @@ fn a_light_reads_the_level_of_detail_of_its_own_pixels() {
     }
 }
 
+fn solid(mesh: Mesh, colour: DVec3) -> Solid {
+    Solid { origin: "a test".into(), mesh: mesh.into(), colour, texture: None }
+}
+
 /// A square plate over the slab, facing up, and the floor beneath.
 fn plate_and_floor(left: f64) -> Vec<Solid> {
     let mut plate = Generator::Plane(Plane { size: 0.8, segments: 3 }).build().unwrap();
     plate.positions.iter_mut().for_each(|position| *position += DVec3::new(left + 0.4, PLATE, 0.1));
     let mut floor = Generator::Plane(Plane { size: 10.0, segments: 2 }).build().unwrap();
     floor.positions.iter_mut().for_each(|position| position.y = FLOOR);
-    [(plate, DVec3::ONE), (floor, DVec3::splat(0.5))]
-        .map(|(mesh, colour)| Solid { mesh: mesh.into(), colour, texture: None })
-        .to_vec()
+    [(plate, DVec3::ONE), (floor, DVec3::splat(0.5))].map(|(mesh, colour)| solid(mesh, colour)).to_vec()
 }
 
 const PLATE: f64 = 1.2;
@@ -329,7 +332,7 @@ fn a_ball_does_not_shade_its_lit_side() {
     let view = view(DVec3::new(0.4, 1.9, 2.9), DVec3::ZERO, 24);
     let mut scene = scene(flat_shell(), level_zero(layers(&[grey(0.0)])), view);
     let mesh = Generator::Sphere(Sphere { segments: 24, rings: 16, ..Sphere::default() }).build().unwrap();
-    scene.solids = [Solid { mesh: mesh.into(), colour: DVec3::ONE, texture: None }].into();
+    scene.solids = [solid(mesh, DVec3::ONE)].into();
     scene.shading = Some(lit(&scene, vec![sun()]));
     let mut bright = scene.clone();
     bright.shading.as_mut().unwrap().lights[0].shadow = false;
@@ -357,7 +360,7 @@ fn the_tolerance_is_kept() {
     for (most, footprint) in [(0.9, 1.0), (1.0, 0.0)] {
         let mut scene = scene(torus_shell(), Pyramid::build(noise([9, 7, 5], most)), view);
         scene.medium.lod_footprint = footprint;
-        scene.solids = [Solid { mesh: ball.clone().into(), colour: DVec3::splat(0.7), texture: None }].into();
+        scene.solids = [solid(ball.clone(), DVec3::splat(0.7))].into();
         scene.shading = Some(lit(&scene, sources.map(|source| light(source, DVec3::ONE)).to_vec()));
         let at = |scene: &Scene, tolerance| {
             let reference = Reference::new(scene, &view).with_tolerance(tolerance);

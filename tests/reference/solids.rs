@@ -24,7 +24,7 @@ fn solid(generator: Generator, colour: DVec3, linear: DMat3, offset: DVec3) -> S
     mesh.positions.iter_mut().for_each(|position| *position = linear * *position + offset);
     let map = linear.inverse().transpose();
     mesh.normals.iter_mut().for_each(|normal| *normal = (map * *normal).normalize());
-    Solid { mesh: mesh.into(), colour, texture: None }
+    Solid { origin: "a test".into(), mesh: mesh.into(), colour, texture: None }
 }
 
 /// Depth, number and barycentric coordinates of the first triangle, by trying all: T. Moeller, B. Trumbore, 1997.

@@ -7,13 +7,13 @@ use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
 use super::ViewConstants;
+use crate::Result;
 use crate::gpu::{
     Batch, Buffer, Draw, Gpu, Keeps, Pipeline, PipelineInfo, Sampled, Target, Texture3d, draw, shaders,
 };
 use crate::progress::Interrupt;
 use crate::scene::{Scene, Solid, View};
 use crate::volume::{Pyramid, Quantity, Volume};
-use crate::{Error, Result};
 
 /// `Triangle` of `glsl/include/triangle.glsl`: see there for each member.
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
@@ -46,10 +46,12 @@ impl Solids {
             Some(texture) => Texture3d::upload(gpu, "a solid's texture", texture),
             None => Texture3d::upload(gpu, "a solid's texture", &white()),
         };
-        let too_large =
-            |error: Error| error.with_help("scale the picture of the solid, or of the base, down");
-        let textures: Vec<Texture3d> =
-            solids.iter().map(|solid| texture(solid).map_err(too_large)).collect::<Result<_>>()?;
+        let texture = |solid: &Solid| {
+            texture(solid).map_err(|error| {
+                error.of(&solid.origin.display().to_string()).with_help("scale the solid's picture down")
+            })
+        };
+        let textures: Vec<Texture3d> = solids.iter().map(texture).collect::<Result<_>>()?;
         Ok((!textures.is_empty()).then_some(Self { textures }))
     }
 }
