@@ -30,7 +30,8 @@ pub(super) fn files(path: &Path) -> Result<Option<Vec<PathBuf>>> {
         return Err(Error::input(path, "no file has this name with a number in place of the `#`")
             .with_help("write as many # as the numbers have digits at least"));
     }
-    if let Some([(a, _), (b, _)]) = found.array_windows().find(|[(a, _), (b, _)]| a + 1 != *b) {
+    let numbers = found.iter().map(|(number, _)| number);
+    if let Some((a, b)) = numbers.clone().zip(numbers.skip(1)).find(|(a, b)| *a + 1 != **b) {
         let message = match a == b {
             true => format!("there are two files of the number {a}"),
             false => format!("number {} is missing, between {a} and {b}", a + 1),
