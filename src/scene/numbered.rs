@@ -59,6 +59,16 @@ impl Moment {
         let file = files as usize;
         if self.loops { file % count } else { file.min(count - 1) }
     }
+
+    /// As [`Moment::file`], with the file that comes after it, and how far towards that it is, 0..1.
+    pub(super) fn between(self, count: usize, rate: f64, time: Option<f64>) -> (usize, usize, f64) {
+        let from = self.file(count, rate, time);
+        let to = if self.loops { (from + 1) % count } else { (from + 1).min(count - 1) };
+        let files = (time.unwrap_or(self.time) * rate).max(0.0);
+        // What is a whole number but for rounding shows one file alone.
+        let part = (files - (files + 1e-6).floor()).max(0.0);
+        (from, to, if from == to { 0.0 } else { part })
+    }
 }
 
 #[cfg(test)]
@@ -92,5 +102,10 @@ mod tests {
         assert_eq!([0.4, 0.55].map(|time| file(time, true, None)), [0, 1]);
         assert_eq!(file(0.4, true, Some(0.2)), 2, "its own time");
         assert_eq!(file(0.0, false, Some(-1.0)), 0);
+        let between = |time: f64, loops: bool| Moment { time, loops }.between(4, 8.0, None);
+        assert_eq!(between(0.125 - 1e-9, false), (1, 2, 0.0), "but for rounding");
+        assert_eq!(between(0.15625, false), (1, 2, 0.25));
+        assert_eq!([between(0.40625, false), between(9.0, false)], [(3, 3, 0.0); 2]);
+        assert_eq!(between(0.40625, true), (3, 0, 0.25));
     }
 }

@@ -13,6 +13,7 @@ use super::file::{
 };
 use super::lighting::Lighting;
 use super::load::Loaded;
+use super::meshes::{Between, MeshFiles};
 use super::motion::Motion;
 use super::numbered::Moment;
 use super::solids::Solids;
@@ -132,8 +133,9 @@ struct Ahead {
 /// The parts of the last scene.
 #[derive(Default)]
 pub(super) struct Parts {
-    /// Without its transform.
-    mesh: Kept<MeshSection, Arc<Mesh>>,
+    /// See [`MeshSection::loaded`], and what a sequence shows.
+    mesh: Kept<(MeshSection, Option<Between>), Arc<Mesh>>,
+    mesh_files: MeshFiles,
     moved: Kept<(Same<Mesh>, Motion), Arc<Mesh>>,
     shell: Kept<(Same<Mesh>, ShellOptions), Arc<Shell>>,
     /// The shell before that, whose memory the next may have.
@@ -172,7 +174,7 @@ impl<'a> Checked<'a> {
     ) -> Result<Self> {
         Ok(Self {
             camera: sight::camera(text, file)?,
-            mesh: MeshSource::of(text, &file.mesh)?,
+            mesh: MeshSource::of(text, &file.mesh, base_dir, moment)?,
             motion: Motion::of(text, file.mesh.get_ref().transform.as_ref(), &file.deform)?,
             volume: VolumeSource::of(text, &file.volume, base_dir, moment)?,
             lighting: Lighting::of(text, file, base_dir)?,
@@ -238,10 +240,10 @@ impl Parts {
         progress: &dyn Progress,
         stopwatch: &mut Stopwatch,
     ) -> Result<(Arc<Mesh>, Arc<Shell>)> {
-        let section = MeshSection { transform: None, ..checked.file.mesh.get_ref().clone() };
-        let mesh = self.mesh.get(section, |_| {
+        let of_mesh = (checked.file.mesh.get_ref().loaded(), checked.mesh.between().cloned());
+        let mesh = self.mesh.get(of_mesh, |_| {
             progress.stage("loading the mesh");
-            let mesh = checked.mesh.load(checked.base_dir)?;
+            let mesh = checked.mesh.load(&mut self.mesh_files)?;
             stopwatch.lap("load.mesh");
             Ok(Arc::new(mesh))
         })?;
