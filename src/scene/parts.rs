@@ -22,7 +22,7 @@ use super::text::Text;
 use super::{Camera, March, Medium, Model, Scene, Sizes, Solid, View, backdrop, sight, span, texel_edges};
 use crate::frame::{Backdrop, Stopwatch};
 use crate::mesh::Mesh;
-use crate::progress::Progress;
+use crate::progress::{Progress, Silent};
 use crate::shell::{Shell, ShellOptions};
 use crate::volume::{Directions, Haze, Pyramid};
 use crate::{Error, Result};
@@ -101,10 +101,12 @@ impl VolumeWork {
     /// `lap` is told of each stage that is done.
     fn make(
         &self,
+        progress: &dyn Progress,
         admit: &dyn Fn([u32; 3]) -> Result<()>,
         resolve: &dyn Fn([u32; 3]) -> Result<()>,
         lap: &mut dyn FnMut(&str),
     ) -> Result<Arc<Pyramid>> {
+        progress.stage("loading the volume");
         let mut volume = self.source.load(admit, resolve)?;
         let layers = f64::from(volume.size[2]);
         let distance = |explicit: Option<f64>, thickness: f64| explicit.unwrap_or(thickness / layers);
@@ -118,6 +120,7 @@ impl VolumeWork {
             Haze { colour: colour.0, depth }.fill(&mut volume);
         }
         lap("load.volume");
+        progress.stage("filtering the volume");
         let pyramid = Pyramid::build_with(volume, self.section.filter, texel);
         lap("load.pyramid");
         Ok(Arc::new(pyramid))
@@ -293,7 +296,7 @@ impl Parts {
         if is_there || self.ahead.as_ref().is_some_and(|ahead| is_it(&ahead.of)) {
             return;
         }
-        let thread = std::thread::spawn(move || work.make(&|_| Ok(()), &|_| Ok(()), &mut |_| {}));
+        let thread = std::thread::spawn(move || work.make(&Silent, &|_| Ok(()), &|_| Ok(()), &mut |_| {}));
         self.ahead = Some(Ahead { of: texels, thread });
     }
 
@@ -335,13 +338,14 @@ impl Parts {
         let (texels, work) = checked.volume_work(rest.unwrap_or(&own));
         let ahead = &mut self.ahead;
         let volume = self.volume.get(texels, |texels| {
-            progress.stage("loading the volume");
             if let Some(Ahead { thread, .. }) = ahead.take_if(|ahead| ahead.of == *texels) {
                 let made = thread.join().expect("making a volume does not panic");
                 stopwatch.lap("load.ahead");
                 return made;
             }
-            work.make(&admit, &|size| checked.resolve(&shell, size), &mut |stage| stopwatch.lap(stage))
+            work.make(progress, &admit, &|size| checked.resolve(&shell, size), &mut |stage| {
+                stopwatch.lap(stage)
+            })
         })?;
         let size = volume.levels[0].size;
         checked.resolve(&shell, size)?;
