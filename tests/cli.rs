@@ -360,14 +360,14 @@ fn an_interrupted_run_leaves_nothing_behind() {
         child.kill().unwrap();
         panic!("the run could not be told to stop");
     }
-    assert_eq!(child.wait().unwrap().code(), Some(130));
+    assert_eq!(child.wait().unwrap().code(), Some(143));
     assert_eq!(desk.files(), before);
 }
 
 #[test]
 fn exit_codes_are_in_the_help() {
     let help = text(&Desk::new().run(&["--help"]).stdout);
-    for code in ["0 ", "1 ", "2 ", "3 ", "4 ", "5 ", "6 ", "130 "] {
+    for code in ["0 ", "1 ", "2 ", "3 ", "4 ", "5 ", "6 ", "130 ", "143 "] {
         assert!(help.lines().any(|line| line.trim_start().starts_with(code)), "{code}: {help}");
     }
 }

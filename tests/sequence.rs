@@ -278,6 +278,62 @@ fn volumes_follow_one_another() {
     assert!(told().contains("number 3 is missing, between 2 and 4"), "{}", told());
 }
 
+/// A square that is higher in each of three files.
+#[test]
+fn meshes_follow_one_another() {
+    let animation = Animation::new(&[]);
+    let file = |number: u32| animation.0.path().join(format!("m.{number:02}.obj"));
+    let write = |number: u32, height: f64, uv: f64, face: &str| {
+        let text = format!(
+            "v 0 {height} 0\nv 0 {height} 1\nv 1 {height} 1\nv 1 {height} 0\nvt 0 0\nvt {uv} 0\nvt 1 1\nvt 0 1\n\
+             f 1/1 2/2 3/3\n{face}\n"
+        );
+        std::fs::write(file(number), text).unwrap();
+    };
+    let face = "f 1/1 3/3 4/4";
+    [(8, 0.0), (9, 1.0), (10, 3.0)].iter().for_each(|&(number, height)| write(number, height, 1.0, face));
+    let scene = STILL
+        .replace("generator = \"torus\", segments = 16, rings = 8", "file = \"m.##.obj\", rate = 1.5")
+        .replace("thickness = 0.3", "thickness = 0.25");
+    std::fs::write(animation.path(), &scene).unwrap();
+    let height = |scene: &Scene| {
+        let heights = scene.shell.vertices.iter().map(|vertex| vertex.y);
+        heights.fold(f64::INFINITY, f64::min)
+    };
+    let mut sequence = animation.open();
+    // Three frames a second, two for each file; after the last the first comes again.
+    for (frame, expected) in (1..=6).zip([0.0, 0.5, 1.0, 2.0, 3.0, 1.5]) {
+        let scene = at(&mut sequence, frame);
+        // A few roundings.
+        assert!((height(&scene) - expected).abs() < 1e-12, "frame {frame}: {}", height(&scene));
+        assert_eq!(differences(&scene, &at(&mut animation.open(), frame)), [""; 0], "frame {frame}");
+    }
+    assert_eq!(sequence.inputs(1).unwrap().files[1..], [8, 9, 10].map(file));
+    let with = |keys: &[&str]| {
+        let keys: Vec<String> = keys.iter().map(|&key| key.to_owned()).collect();
+        at(&mut Sequence::open(&animation.path(), &keys).unwrap(), 6)
+    };
+    assert_eq!(height(&with(&["mesh.time=0"])), 0.0, "a time of its own stands");
+    assert_eq!(height(&with(&["timeline.loop=false"])), 3.0, "it stands still at its end");
+    // A projection along Z would change with the height: it is that of the first file.
+    let projected = with(&["mesh.projection=planar-z", "mesh.time=1"]);
+    let first = with(&["mesh.projection=planar-z", "mesh.time=0"]);
+    assert_eq!(projected.shell.texture, first.shell.texture);
+
+    let told = || animation_error(&animation);
+    write(9, 1.0, 0.5, face);
+    assert!(told().contains("m.09.obj: triangle 1 has other texture coordinates than in"), "{}", told());
+    write(9, 1.0, 1.0, "f 1/1 4/4 3/3");
+    assert!(told().contains("m.09.obj: triangle 2 joins other vertices than in"), "{}", told());
+    write(9, 1.0, 1.0, "");
+    assert!(told().contains("m.09.obj: has 1 triangles, but"), "{}", told());
+    std::fs::remove_file(file(9)).unwrap();
+    assert!(told().contains("number 9 is missing, between 8 and 10"), "{}", told());
+    let alone = scene.replace("m.##.obj", "m.08.obj");
+    std::fs::write(animation.path(), alone).unwrap();
+    assert!(told().contains("`rate` and `time` are for a sequence"), "{}", told());
+}
+
 fn animation_error(animation: &Animation) -> String {
     Sequence::open(&animation.path(), &[]).map(drop).unwrap_err().to_string()
 }

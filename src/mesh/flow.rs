@@ -3,7 +3,7 @@
 //! Gradient noise (Ken Perlin, "Improving Noise", SIGGRAPH 2002) whose gradients turn: Ken Perlin, Fabrice Neyret, "Flow
 //! Noise", SIGGRAPH 2001 technical sketches. Every lattice point has two perpendicular directions `a` and `b` of unit
 //! length; its gradient is `a cos(2 pi phase) + b sin(2 pi phase)`. Deviations: the pairs come from a seeded table of
-//! [`PAIRS`], chosen by an integer hash (the finaliser of SplitMix64, Steele, Lea, Flood 2014) of the lattice point, so
+//! 64, chosen by an integer hash (the finaliser of SplitMix64, Steele, Lea, Flood 2014) of the lattice point, so
 //! that nothing has to be stored and there is no period in space.
 
 use std::f64::consts::TAU;

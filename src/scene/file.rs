@@ -139,8 +139,19 @@ pub struct MeshSection {
     pub file: Option<PathBuf>,
     /// How texture coordinates are made, in place of those of the file.
     pub projection: Option<Projection>,
+    /// Of a sequence of files: how many a second.
+    pub rate: Option<Rate>,
+    /// Of a sequence of files: seconds after its first; by default the time of the frame.
+    pub time: Option<Finite>,
     /// Where it is.
     pub transform: Option<TransformSection>,
+}
+
+impl MeshSection {
+    /// The same, with what the mesh that is loaded does not depend on as if nothing were said of it; of a sequence, without when.
+    pub(super) fn loaded(&self) -> Self {
+        Self { rate: None, time: None, transform: None, ..self.clone() }
+    }
 }
 
 /// `[shell]`.
@@ -374,7 +385,7 @@ fn white() -> Colour {
     Colour::linear(1.0, 1.0, 1.0)
 }
 
-fn default_rate() -> Rate {
+pub(super) fn default_rate() -> Rate {
     Rate(24.0)
 }
 

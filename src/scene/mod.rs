@@ -23,6 +23,7 @@ pub mod file;
 mod files;
 mod lighting;
 pub mod load;
+mod meshes;
 mod motion;
 mod numbered;
 mod parts;

@@ -30,7 +30,8 @@ pub(super) fn files(path: &Path) -> Result<Option<Vec<PathBuf>>> {
         return Err(Error::input(path, "no file has this name with a number in place of the `#`")
             .with_help("write as many # as the numbers have digits at least"));
     }
-    if let Some([(a, _), (b, _)]) = found.array_windows().find(|[(a, _), (b, _)]| a + 1 != *b) {
+    let numbers = found.iter().map(|(number, _)| number);
+    if let Some((a, b)) = numbers.clone().zip(numbers.skip(1)).find(|(a, b)| *a + 1 != **b) {
         let message = match a == b {
             true => format!("there are two files of the number {a}"),
             false => format!("number {} is missing, between {a} and {b}", a + 1),
@@ -57,6 +58,16 @@ impl Moment {
         let files = (time.unwrap_or(self.time) * rate + 1e-6).floor().max(0.0);
         let file = files as usize;
         if self.loops { file % count } else { file.min(count - 1) }
+    }
+
+    /// As [`Moment::file`], with the file that comes after it, and how far towards that it is, 0..1.
+    pub(super) fn between(self, count: usize, rate: f64, time: Option<f64>) -> (usize, usize, f64) {
+        let from = self.file(count, rate, time);
+        let to = if self.loops { (from + 1) % count } else { (from + 1).min(count - 1) };
+        let files = (time.unwrap_or(self.time) * rate).max(0.0);
+        // What is a whole number but for rounding shows one file alone.
+        let part = (files - (files + 1e-6).floor()).max(0.0);
+        (from, to, if from == to { 0.0 } else { part })
     }
 }
 
@@ -91,5 +102,10 @@ mod tests {
         assert_eq!([0.4, 0.55].map(|time| file(time, true, None)), [0, 1]);
         assert_eq!(file(0.4, true, Some(0.2)), 2, "its own time");
         assert_eq!(file(0.0, false, Some(-1.0)), 0);
+        let between = |time: f64, loops: bool| Moment { time, loops }.between(4, 8.0, None);
+        assert_eq!(between(0.125 - 1e-9, false), (1, 2, 0.0), "but for rounding");
+        assert_eq!(between(0.15625, false), (1, 2, 0.25));
+        assert_eq!([between(0.40625, false), between(9.0, false)], [(3, 3, 0.0); 2]);
+        assert_eq!(between(0.40625, true), (3, 0, 0.25));
     }
 }

@@ -13,6 +13,7 @@ use super::file::{
 };
 use super::lighting::Lighting;
 use super::load::Loaded;
+use super::meshes::{Between, MeshFiles};
 use super::motion::Motion;
 use super::numbered::Moment;
 use super::solids::Solids;
@@ -21,7 +22,7 @@ use super::text::Text;
 use super::{Camera, March, Medium, Model, Scene, Sizes, Solid, View, backdrop, sight, span, texel_edges};
 use crate::frame::{Backdrop, Stopwatch};
 use crate::mesh::Mesh;
-use crate::progress::Progress;
+use crate::progress::{Progress, Silent};
 use crate::shell::{Shell, ShellOptions};
 use crate::volume::{Directions, Haze, Pyramid};
 use crate::{Error, Result};
@@ -100,10 +101,12 @@ impl VolumeWork {
     /// `lap` is told of each stage that is done.
     fn make(
         &self,
+        progress: &dyn Progress,
         admit: &dyn Fn([u32; 3]) -> Result<()>,
         resolve: &dyn Fn([u32; 3]) -> Result<()>,
         lap: &mut dyn FnMut(&str),
     ) -> Result<Arc<Pyramid>> {
+        progress.stage("loading the volume");
         let mut volume = self.source.load(admit, resolve)?;
         let layers = f64::from(volume.size[2]);
         let distance = |explicit: Option<f64>, thickness: f64| explicit.unwrap_or(thickness / layers);
@@ -117,6 +120,7 @@ impl VolumeWork {
             Haze { colour: colour.0, depth }.fill(&mut volume);
         }
         lap("load.volume");
+        progress.stage("filtering the volume");
         let pyramid = Pyramid::build_with(volume, self.section.filter, texel);
         lap("load.pyramid");
         Ok(Arc::new(pyramid))
@@ -132,8 +136,9 @@ struct Ahead {
 /// The parts of the last scene.
 #[derive(Default)]
 pub(super) struct Parts {
-    /// Without its transform.
-    mesh: Kept<MeshSection, Arc<Mesh>>,
+    /// See [`MeshSection::loaded`], and what a sequence shows.
+    mesh: Kept<(MeshSection, Option<Between>), Arc<Mesh>>,
+    mesh_files: MeshFiles,
     moved: Kept<(Same<Mesh>, Motion), Arc<Mesh>>,
     shell: Kept<(Same<Mesh>, ShellOptions), Arc<Shell>>,
     /// The shell before that, whose memory the next may have.
@@ -172,7 +177,7 @@ impl<'a> Checked<'a> {
     ) -> Result<Self> {
         Ok(Self {
             camera: sight::camera(text, file)?,
-            mesh: MeshSource::of(text, &file.mesh)?,
+            mesh: MeshSource::of(text, &file.mesh, base_dir, moment)?,
             motion: Motion::of(text, file.mesh.get_ref().transform.as_ref(), &file.deform)?,
             volume: VolumeSource::of(text, &file.volume, base_dir, moment)?,
             lighting: Lighting::of(text, file, base_dir)?,
@@ -238,10 +243,10 @@ impl Parts {
         progress: &dyn Progress,
         stopwatch: &mut Stopwatch,
     ) -> Result<(Arc<Mesh>, Arc<Shell>)> {
-        let section = MeshSection { transform: None, ..checked.file.mesh.get_ref().clone() };
-        let mesh = self.mesh.get(section, |_| {
+        let of_mesh = (checked.file.mesh.get_ref().loaded(), checked.mesh.between().cloned());
+        let mesh = self.mesh.get(of_mesh, |_| {
             progress.stage("loading the mesh");
-            let mesh = checked.mesh.load(checked.base_dir)?;
+            let mesh = checked.mesh.load(&mut self.mesh_files)?;
             stopwatch.lap("load.mesh");
             Ok(Arc::new(mesh))
         })?;
@@ -291,7 +296,7 @@ impl Parts {
         if is_there || self.ahead.as_ref().is_some_and(|ahead| is_it(&ahead.of)) {
             return;
         }
-        let thread = std::thread::spawn(move || work.make(&|_| Ok(()), &|_| Ok(()), &mut |_| {}));
+        let thread = std::thread::spawn(move || work.make(&Silent, &|_| Ok(()), &|_| Ok(()), &mut |_| {}));
         self.ahead = Some(Ahead { of: texels, thread });
     }
 
@@ -333,13 +338,14 @@ impl Parts {
         let (texels, work) = checked.volume_work(rest.unwrap_or(&own));
         let ahead = &mut self.ahead;
         let volume = self.volume.get(texels, |texels| {
-            progress.stage("loading the volume");
             if let Some(Ahead { thread, .. }) = ahead.take_if(|ahead| ahead.of == *texels) {
                 let made = thread.join().expect("making a volume does not panic");
                 stopwatch.lap("load.ahead");
                 return made;
             }
-            work.make(&admit, &|size| checked.resolve(&shell, size), &mut |stage| stopwatch.lap(stage))
+            work.make(progress, &admit, &|size| checked.resolve(&shell, size), &mut |stage| {
+                stopwatch.lap(stage)
+            })
         })?;
         let size = volume.levels[0].size;
         checked.resolve(&shell, size)?;

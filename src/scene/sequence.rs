@@ -8,7 +8,7 @@ use super::numbered::Moment;
 use super::parts::{Checked, Parts, Rest};
 use super::text::Text;
 use super::timeline::{Timeline, Track};
-use super::{Sizes, files, load, source};
+use super::{Sizes, files, load, meshes, source};
 use crate::progress::Progress;
 use crate::{Error, Result};
 
@@ -56,6 +56,7 @@ impl Sequence {
             let text = sequence.text_at(frame)?;
             Checked::new(&text, &load::read(&text)?, &sequence.base_dir, sequence.moment(frame))?;
         }
+        meshes::check_all(file.mesh.get_ref(), &sequence.base_dir)?;
         source::check_volumes(file.volume.get_ref(), &sequence.base_dir)?;
         Ok(sequence)
     }

@@ -4,7 +4,8 @@ use std::path::{Path, PathBuf};
 
 use toml::Spanned;
 
-use super::file::{DensitySection, MeshSection, VolumeSection};
+use super::file::{self, DensitySection, MeshSection, VolumeSection};
+use super::meshes::{Between, MeshFiles};
 use super::numbered::{self, Moment};
 use super::text::Text;
 use crate::mesh::generate::Generator;
@@ -35,15 +36,21 @@ pub(super) fn check_volumes(section: &VolumeSection, base_dir: &Path) -> Result<
 /// Where the mesh comes from.
 pub(super) enum MeshSource<'a> {
     Generator(&'a Generator),
-    File(&'a Path, Option<&'a Projection>),
+    File(PathBuf, Option<&'a Projection>),
+    Sequence(Between, Option<&'a Projection>),
 }
 
 impl<'a> MeshSource<'a> {
-    /// What a section names, if that is one thing.
+    /// What a section names, if that is one thing; of a sequence, what it shows at that moment.
     ///
     /// # Errors
-    /// [`Error::Text`](crate::Error::Text) with the spot.
-    pub(super) fn of(text: &Text, section: &'a Spanned<MeshSection>) -> Result<Self> {
+    /// [`Error`] with the spot, or with the file.
+    pub(super) fn of(
+        text: &Text,
+        section: &'a Spanned<MeshSection>,
+        base_dir: &Path,
+        moment: Moment,
+    ) -> Result<Self> {
         match section.get_ref() {
             MeshSection { generator: Some(generator), file: None, projection: None, .. } => {
                 generator.check().map_err(|bad| {
@@ -52,17 +59,37 @@ impl<'a> MeshSource<'a> {
                 })?;
                 Ok(Self::Generator(generator))
             }
-            MeshSection { generator: None, file: Some(file), projection, .. } => {
-                Ok(Self::File(file, projection.as_ref()))
+            MeshSection { generator: None, file: Some(file), projection, rate, time, .. } => {
+                let path = base_dir.join(file);
+                let Some(files) = numbered::files(&path)? else {
+                    if rate.is_some() || time.is_some() {
+                        let message = "`rate` and `time` are for a sequence of files: `file` has no `#`";
+                        return Err(text.error(section.span(), message));
+                    }
+                    return Ok(Self::File(path, projection.as_ref()));
+                };
+                let rate = rate.unwrap_or_else(file::default_rate);
+                let between = Between::of(files, moment, rate.0, time.map(|time| time.0));
+                Ok(Self::Sequence(between, projection.as_ref()))
             }
             _ => Err(text.error(section.span(), "[mesh] needs either `generator` with its keys or `file`")),
         }
     }
 
-    pub(super) fn load(&self, base_dir: &Path) -> Result<Mesh> {
+    /// What it shows, if it is a sequence.
+    pub(super) fn between(&self) -> Option<&Between> {
+        match self {
+            Self::Sequence(between, _) => Some(between),
+            _ => None,
+        }
+    }
+
+    /// `files` are those that were read for the sequence before.
+    pub(super) fn load(&self, files: &mut MeshFiles) -> Result<Mesh> {
         match self {
             Self::Generator(generator) => generator.build(),
-            Self::File(file, projection) => obj::load(base_dir.join(file), *projection),
+            Self::File(file, projection) => obj::load(file, *projection),
+            Self::Sequence(between, projection) => between.load(*projection, files),
         }
     }
 }

@@ -44,7 +44,7 @@ enum Ready {
     Bend(Bend),
     Twist(Twist),
     Taper(Taper),
-    Noise(Noise, Flow),
+    Noise(Noise, Box<Flow>),
 }
 
 /// Vertices that one task of the thread pool takes at least: some 20 us of work.
@@ -71,7 +71,7 @@ impl Ready {
             Deform::Bend(bend) => Self::Bend(bend),
             Deform::Twist(twist) => Self::Twist(twist),
             Deform::Taper(taper) => Self::Taper(taper),
-            Deform::Noise(noise) => Self::Noise(noise, Flow::new(noise.phase, noise.seed)),
+            Deform::Noise(noise) => Self::Noise(noise, Box::new(Flow::new(noise.phase, noise.seed))),
         }
     }
 

@@ -35,7 +35,7 @@ impl Transform {
         mesh.positions.par_iter_mut().zip(&mut mesh.normals).with_min_len(TASK).for_each(
             |(position, normal)| {
                 *position = world_from_mesh.transform_point3(*position);
-                *normal = side * carried(world_from_mesh.matrix3.into(), *normal);
+                *normal = side * carried(world_from_mesh.matrix3, *normal);
             },
         );
         if is_mirrored {

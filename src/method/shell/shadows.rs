@@ -91,7 +91,8 @@ impl Shadows {
     /// Draws the pictures of all lights that cast shadows; `None` where there is no such light.
     ///
     /// # Errors
-    /// [`Error::Device`] where the pictures are too large for the device, [`Error::OutOfMemory`], [`Error::Interrupted`].
+    /// [`Error::Device`](crate::Error::Device) where the pictures are too large for the device,
+    /// [`Error::OutOfMemory`](crate::Error::OutOfMemory), [`Error::Interrupted`](crate::Error::Interrupted).
     pub fn draw(
         gpu: &Arc<Gpu>,
         scene: &Scene,
