@@ -135,7 +135,8 @@ fn a_cycle_around_a_ball_in_the_sun_agrees_with_the_reference() {
     println!("RMSE {error:e}");
     // Half of the bound of any scene with shadows, whose edges are those of pixels: see docs/gallery.md.
     assert!(error < 5e-3, "{error}");
-    let changes: [(&str, fn(&mut Scene)); 3] = [
+    type Change = fn(&mut Scene);
+    let changes: [(&str, Change); 3] = [
         ("the ball", |scene| scene.solids = [].into()),
         ("the shadows", |scene| scene.shading.as_mut().unwrap().lights[0].shadow = false),
         ("the order of two bars' paints", |scene| {
