@@ -323,7 +323,7 @@ fn meshes_follow_one_another() {
     let told = || animation_error(&animation);
     write(9, 1.0, 0.5, face);
     assert!(told().contains("m.09.obj: triangle 1 has other texture coordinates than in"), "{}", told());
-    write(9, 1.0, 1.0, "f 1/1 4/4 3/3");
+    write(9, 1.0, 1.0, "f 3/3 4/4 1/1");
     assert!(told().contains("m.09.obj: triangle 2 joins other vertices than in"), "{}", told());
     write(9, 1.0, 1.0, "");
     assert!(told().contains("m.09.obj: has 1 triangles, but"), "{}", told());
