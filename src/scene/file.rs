@@ -18,6 +18,7 @@ use super::camera::DEFAULT_FOV_DEGREES;
 use super::motion::{DeformSection, TransformSection};
 use super::shading::DEFAULT_SHADOW_SIZE;
 use super::timeline::Ease;
+use super::wind::WindSection;
 use crate::mesh::generate::Generator;
 use crate::mesh::projection::Projection;
 use crate::value::{
@@ -160,9 +161,13 @@ impl MeshSection {
 pub struct ShellSection {
     /// World units.
     pub thickness: Positive,
+    /// A PNG picture, relative to the scene file: grey is a factor on the thickness.
+    pub thickness_map: Option<PathBuf>,
     /// Rounds of averaging of the extrusion directions.
     #[serde(default = "no_rounds")]
     pub smoothing: Rounds,
+    /// What the outer side leans with.
+    pub wind: Option<WindSection>,
     /// Whether it gives way where it would fold.
     #[serde(default)]
     pub limit: Limit,
@@ -478,7 +483,12 @@ recipe = "fog.toml"
                 found += 1;
             }
         }
-        assert_eq!(found, 6 + 12 + 6 + 3 + 3 + 10 + 2 + 3);
+        assert_eq!(found, 8 + 12 + 6 + 3 + 3 + 10 + 2 + 3);
+        let wind = keys("shell.wind");
+        assert_eq!(wind, ["direction", "strength", "gust", "size", "phase"]);
+        let (_, documented) = DOCUMENTATION.split_once("\n### `[shell.wind]`").unwrap();
+        let documented = documented.split("\n## ").next().unwrap();
+        assert!(wind.iter().all(|key| documented.contains(&format!("\n| `{key}` |"))), "{wind:?}");
         for (section, count) in [("light", 6), ("solid", 6), ("track", 4), ("deform", 14)] {
             let text = Text::new("keys", format!("{SCENE}[[{section}]]\nunknown_key = 1"), &[]).unwrap();
             let message = text.parse::<SceneFile>(("mesh", "generator")).unwrap_err().to_string();

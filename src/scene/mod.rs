@@ -36,7 +36,9 @@ mod solids;
 mod source;
 pub mod span;
 pub(crate) mod text;
+mod thickness;
 mod timeline;
+mod wind;
 
 pub use backdrop::Background;
 pub use camera::{Camera, View};

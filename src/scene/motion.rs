@@ -133,8 +133,14 @@ impl Motion {
     }
 }
 
-fn vector(Exactly(numbers): &Exactly<3, Finite>) -> DVec3 {
+pub(super) fn vector(Exactly(numbers): &Exactly<3, Finite>) -> DVec3 {
     DVec3::from_array(numbers.map(|x| x.0))
+}
+
+/// In the direction of a vector; none where it is zero.
+pub(super) fn unit(given: DVec3) -> Option<DVec3> {
+    // Scaled first: the square of what is far from 1 is out of range.
+    (given / given.abs().max_element()).try_normalize()
 }
 
 fn transform(text: &Text, section: &TransformSection) -> Result<Transform> {
@@ -185,9 +191,7 @@ fn deform(text: &Text, section: &Spanned<DeformSection>) -> Result<Deform> {
     }
     let direction = |given: &Option<Exactly<3, Finite>>, key: &str| {
         let given = given.as_ref().map_or(DVec3::ZERO, vector);
-        // Scaled first: the square of what is far from 1 is out of range.
-        let unit = (given / given.abs().max_element()).normalize_or_zero();
-        if unit == DVec3::ZERO { Err(error(format!("`{key}` must not be zero"))) } else { Ok(unit) }
+        unit(given).ok_or_else(|| error(format!("`{key}` must not be zero")))
     };
     let range = section.range.map(|Exactly(range)| range.map(|x| x.0));
     if let Some([from, to]) = range

@@ -19,11 +19,12 @@ use super::numbered::Moment;
 use super::solids::Solids;
 use super::source::{MeshSource, VolumeSource};
 use super::text::Text;
+use super::thickness::ThicknessMap;
 use super::{Camera, March, Medium, Model, Scene, Sizes, Solid, View, backdrop, sight, span, texel_edges};
 use crate::frame::{Backdrop, Stopwatch};
 use crate::mesh::Mesh;
 use crate::progress::{Progress, Silent};
-use crate::shell::{Shell, ShellOptions};
+use crate::shell::{Shell, ShellOptions, Wind};
 use crate::volume::{Directions, Haze, Pyramid};
 use crate::{Error, Result};
 
@@ -140,6 +141,7 @@ pub(super) struct Parts {
     mesh: Kept<(MeshSection, Option<Between>), Arc<Mesh>>,
     mesh_files: MeshFiles,
     moved: Kept<(Same<Mesh>, Motion), Arc<Mesh>>,
+    thickness_map: Kept<PathBuf, Arc<ThicknessMap>>,
     shell: Kept<(Same<Mesh>, ShellOptions), Arc<Shell>>,
     /// The shell before that, whose memory the next may have.
     spare: Option<Arc<Shell>>,
@@ -160,6 +162,7 @@ pub(super) struct Checked<'a> {
     camera: Option<Camera>,
     mesh: MeshSource<'a>,
     motion: Motion,
+    wind: Option<Wind>,
     volume: VolumeSource,
     lighting: Option<Lighting<'a>>,
 }
@@ -179,6 +182,7 @@ impl<'a> Checked<'a> {
             camera: sight::camera(text, file)?,
             mesh: MeshSource::of(text, &file.mesh, base_dir, moment)?,
             motion: Motion::of(text, file.mesh.get_ref().transform.as_ref(), &file.deform)?,
+            wind: file.shell.wind.as_ref().map(|wind| wind.wind(text)).transpose()?,
             volume: VolumeSource::of(text, &file.volume, base_dir, moment)?,
             lighting: Lighting::of(text, file, base_dir)?,
             text,
@@ -187,12 +191,13 @@ impl<'a> Checked<'a> {
         })
     }
 
-    fn shell_options(&self) -> ShellOptions {
+    fn shell_options(&self, thickness_scale: Vec<f64>) -> ShellOptions {
         let shell = &self.file.shell;
         ShellOptions {
             thickness: shell.thickness.0,
-            thickness_scale: Vec::new(),
+            thickness_scale,
             smoothing_rounds: shell.smoothing.0,
+            wind: self.wind,
             limited: shell.limit == Limit::Safe,
             uv_scale: DVec2::from_array(shell.uv_scale.0.map(|x| x.0)),
             uv_rotation: shell.uv_rotation.0.to_radians(),
@@ -259,9 +264,13 @@ impl Parts {
             stopwatch.lap("deform");
             Ok(Arc::new(moved))
         })?;
+        let thickness_map = checked.file.shell.thickness_map.as_ref().map(|file| {
+            self.thickness_map.get(checked.base_dir.join(file), |path| ThicknessMap::read(path).map(Arc::new))
+        });
+        let scale = thickness_map.transpose()?.map_or_else(Vec::new, |map| map.factors(&mesh));
         let before = self.shell.0.as_ref().map(|(_, shell)| shell.clone());
         let spare = &mut self.spare;
-        let shell = self.shell.get((Same(mesh.clone()), checked.shell_options()), |(_, options)| {
+        let shell = self.shell.get((Same(mesh.clone()), checked.shell_options(scale)), |(_, options)| {
             progress.stage("building the shell");
             let shell = match before {
                 Some(before) if before.topology.is_of(&mesh) => {

@@ -17,12 +17,19 @@ const CANCELLED: f64 = 1e-9;
 /// Unit directions of extrusion, one a position.
 pub(super) fn directions(mesh: &Mesh, options: &ShellOptions) -> Vec<DVec3> {
     let mut directions = mesh.normals.clone();
-    if options.smoothing_rounds == 0 {
-        return directions;
+    if options.smoothing_rounds > 0 {
+        average(mesh, options.smoothing_rounds, &mut directions);
     }
+    if let Some(wind) = &options.wind {
+        wind.turn(mesh, &mut directions);
+    }
+    directions
+}
+
+fn average(mesh: &Mesh, rounds: u32, directions: &mut [DVec3]) {
     let edges = directed_edges(mesh);
-    for _ in 0..options.smoothing_rounds {
-        let mut sums = directions.clone();
+    for _ in 0..rounds {
+        let mut sums = directions.to_vec();
         for &(from, to) in &edges {
             sums[from as usize] += directions[to as usize];
         }
@@ -32,7 +39,6 @@ pub(super) fn directions(mesh: &Mesh, options: &ShellOptions) -> Vec<DVec3> {
             }
         });
     }
-    directions
 }
 
 /// World-space thickness above position `id`.

@@ -1,7 +1,7 @@
 //! A thickness that a shell can bear: lowered around the vertices where it would fold over.
 //!
-//! The volume of a tetrahedron, in parts of a third of its triangle's area times the mean height of its three outer vertices, is 1 in
-//! a shell of parallel prisms, and falls below 0 where the shell folds. As the thickness goes to 0 it tends to the cosine between the
+//! The volume of a tetrahedron, in parts of a third of its triangle's area times the length of the edge that stands on the triangle, is
+//! 1 in a shell of parallel prisms, and falls below 0 where the shell folds. As the thickness goes to 0 it tends to the cosine between the
 //! triangle's normal and one of the directions of extrusion, so that a shell whose directions all leave its triangles on the outer side
 //! is sound if it is only thin enough.
 //!
@@ -45,17 +45,22 @@ pub(super) fn factors(
             let ids = mesh.triangles[triangle].map(|id| id as usize);
             let normal = area_vector(ids.map(|id| mesh.positions[id]));
             let area = normal.length();
-            let height = ids.iter().map(|&id| factors[id] * full(id)).sum::<f64>() / 3.0;
             let cosine = ids.iter().map(|&id| normal.dot(directions[id]) / area).fold(1.0, f64::min);
             // A triangle without an area has nothing to lose.
-            let least = if area > 0.0 { LEAST * cosine.max(0.0) * area * height } else { return false };
+            if area == 0.0 {
+                return false;
+            }
             let vertex = |id: u32| {
                 let id = (id % base) as usize;
                 mesh.positions[id] + factors[id] * full(id) * directions[id]
             };
             topology.tetrahedra[3 * triangle..3 * triangle + 3].iter().any(|ids| {
+                // One edge stands on the surface. Where the thickness is 0 it has no length, whatever its factor.
+                let outer = ids.iter().find(|&&id| id >= base && ids.contains(&(id - base)));
+                let height =
+                    outer.map_or(0.0, |id| factors[(id - base) as usize] * full((id - base) as usize));
                 let corners = ids.map(|id| if id < base { mesh.positions[id as usize] } else { vertex(id) });
-                determinant(corners) <= least
+                height > 0.0 && determinant(corners) <= LEAST * cosine.max(0.0) * area * height
             })
         };
         let short: Vec<usize> = (0..mesh.triangles.len())

@@ -23,12 +23,14 @@ mod frames;
 mod health;
 mod limit;
 mod topology;
+mod wind;
 
 use std::sync::Arc;
 
 pub(crate) use cell::determinant;
 pub use frames::{FrameKind, Frames};
 use glam::{DAffine3, DMat3, DVec2, DVec3, DVec4};
+pub use wind::Wind;
 
 /// In [`Topology::neighbours`]: no tetrahedron lies beyond that face.
 pub const EXTERIOR: u32 = u32::MAX;
@@ -80,6 +82,8 @@ pub struct ShellOptions {
     pub thickness_scale: Vec<f64>,
     /// Rounds of neighbourhood averaging applied to the extrusion directions.
     pub smoothing_rounds: u32,
+    /// What the outer vertices lean with, after the averaging.
+    pub wind: Option<Wind>,
     /// Whether the shell is made thinner where it would fold.
     pub limited: bool,
     /// Texture coordinates are `R (uv_scale * uv) + uv_offset`, modulo 1; R turns by `uv_rotation`.
@@ -155,6 +159,7 @@ impl ShellOptions {
             thickness,
             thickness_scale: Vec::new(),
             smoothing_rounds: 0,
+            wind: None,
             limited: false,
             uv_scale: DVec2::ONE,
             uv_rotation: 0.0,
