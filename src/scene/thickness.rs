@@ -27,6 +27,10 @@ impl ThicknessMap {
             return Err(Error::input(path, "is a folder, not a picture").with_help(help));
         }
         let raw = stack::read(path).map_err(|error| error.with_help(help))?;
+        if raw.size[2] != 1 {
+            return Err(Error::input(path, format!("stands for {} pictures, not for one", raw.size[2]))
+                .with_help(help));
+        }
         let luminance = |pixel: &[f32]| match *pixel {
             [red, green, blue, ..] => 0.2126 * red + 0.7152 * green + 0.0722 * blue,
             _ => pixel[0],

@@ -67,7 +67,7 @@ mod tests {
 
     #[test]
     fn a_plane_leans_with_the_wind() {
-        let shell = load("wind = { direction = [1e200, 0, 0], strength = 0.75 }").unwrap().scene.shell;
+        let shell = load("wind = { direction = [1e30, 0, 0], strength = 0.75 }").unwrap().scene.shell;
         for (base, outer) in
             shell.vertices.iter().zip(&shell.vertices[shell.topology.base_vertices as usize..])
         {
@@ -82,12 +82,10 @@ mod tests {
         let mistakes = [
             ("wind = { direction = [0, 0, 0], strength = 1 }", "[0, 0, 0]", "not zero"),
             ("wind = { direction = [1, 0, 0], strength = nan }", "nan", "finite"),
-            ("wind = { direction = [1, 0, 0], strength = 1, size = 0 }", "0 }", "above 0"),
+            ("wind = { direction = [1, 0, 0], strength = 1, size = 0 }", "0", "greater than 0"),
         ];
-        for (wind, spot, part) in &mistakes[..2] {
+        for (wind, spot, part) in mistakes {
             assert_underlined(load(wind).unwrap_err(), spot, part);
         }
-        let (wind, _, part) = mistakes[2];
-        assert!(format!("{:?}", load(wind).unwrap_err()).contains(part));
     }
 }

@@ -1,9 +1,9 @@
 //! Wind in the shell: directions of extrusion that lean with it.
 //!
-//! A direction `d` of unit length becomes `d + s t`, of the same length again, where `t` is the part of the wind's direction that runs
-//! along the surface: it turns by the arc tangent of `s` times the sine of the angle between wind and surface normal, where it was the
-//! normal, so that the angle grows smoothly with the strength `s`, and no wind from above or below turns anything. In a gust
-//! `s` is the strength plus the amplitude times a noise that flows (see [`Flow`]).
+//! A direction `d` of unit length becomes `d + w`, of the same length again, where `w` is the wind: strength times direction, without
+//! what of it blows into the surface. A normal at an angle `a` to the wind so turns by the arc tangent of
+//! `s sin a / (1 + s max(cos a, 0))`, which grows smoothly with the strength `s`: never past the wind, and not at all in one from
+//! straight above. In a gust `s` is the strength plus the amplitude times a noise that flows (see [`Flow`]).
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -48,7 +48,8 @@ impl Wind {
     /// A direction in a wind of that strength. It is never less than 5 degrees above the surface, unless it was before: then it
     /// comes no nearer.
     fn leaning(&self, direction: DVec3, normal: DVec3, strength: f64) -> DVec3 {
-        let along = strength * self.direction.reject_from_normalized(normal);
+        let wind = strength * self.direction;
+        let along = wind - wind.dot(normal).min(0.0) * normal;
         if along == DVec3::ZERO {
             return direction;
         }
@@ -99,7 +100,8 @@ mod tests {
             let found = extrusions(&mesh, Some(Wind { strength, ..WIND }));
             for (extrusion, normal) in found.iter().zip(&mesh.normals) {
                 assert!((extrusion.length() - 0.25).abs() < 1e-12);
-                let expected = (strength * DVec3::X.reject_from_normalized(*normal).length()).atan();
+                let sine = DVec3::X.reject_from_normalized(*normal).length();
+                let expected = (strength * sine).atan2(1.0 + strength * normal.x.max(0.0));
                 // An angle near 0 between vectors with errors of 1e-16 is known to their square root.
                 assert!((extrusion.angle_between(*normal) - expected).abs() < 1e-7, "{extrusion} {normal}");
                 assert!(extrusion.x >= 0.25 * normal.x - 1e-12, "against the wind");

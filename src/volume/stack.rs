@@ -23,7 +23,7 @@ pub(super) fn is_pattern(path: &Path) -> bool {
 
 /// Reads the images in a folder (`*.png`), those of a pattern, or one image, in the natural order of their
 /// names: `slice_2.png` is before `slice_10.png`.
-pub(super) fn read(path: &Path) -> Result<RawVolume> {
+pub(crate) fn read(path: &Path) -> Result<RawVolume> {
     let images = images(path)?;
     let mut values = Vec::new();
     let shape = shape(&decoder(&images[0])?);
