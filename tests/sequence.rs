@@ -13,7 +13,7 @@ use mesoshell::volume::{self, Volume};
 
 const STILL: &str = r#"
 mesh = { generator = "torus", segments = 16, rings = 8 }
-shell = { thickness = 0.3, uv_scale = [4, 2] }
+shell = { thickness = 0.3, uv_scale = [4, 2], wind = { direction = [1, 0, 0], strength = 0.2 } }
 volume = { recipe = "clouds.toml" }
 camera = { eye = [0, 3.0, 4.4], target = [0, 0, 0] }
 image = { size = [48, 48] }
@@ -43,7 +43,7 @@ loop = true
 "#;
 
 /// A key, and its values at the start and after a second, of two.
-const MOVES: [(&str, &str, &str); 10] = [
+const MOVES: [(&str, &str, &str); 11] = [
     ("camera.orbit", "0", "90"),
     ("shell.thickness", "0.3", "0.2"),
     ("shell.uv_offset", "[0, 0]", "[0.5, 0.25]"),
@@ -54,6 +54,7 @@ const MOVES: [(&str, &str, &str); 10] = [
     ("shading.diffuse", "1", "0.5"),
     ("deform.twist.angle", "0", "60"),
     ("mesh.transform.rotate", "[0, 0, 0]", "[30, 10, 0]"),
+    ("shell.wind.strength", "0.2", "0.6"),
 ];
 
 struct Animation(tempfile::TempDir);
@@ -141,6 +142,7 @@ fn what_does_not_move_is_shared() {
     assert_eq!(shared("light.sun.direction"), all);
     assert_eq!(shared("shell.uv_offset"), ["topology", "vertices", "volume", "directions", "solids"]);
     assert_eq!(shared("shell.thickness"), ["topology", "volume", "directions", "solids"]);
+    assert_eq!(shared("shell.wind.strength"), ["topology", "volume", "directions", "solids"]);
     assert_eq!(shared("mesh.minor_radius"), ["topology", "volume", "directions"]);
     assert_eq!(shared("deform.twist.angle"), ["topology", "volume", "directions"]);
     assert_eq!(shared("volume.vary.coverage"), ["topology", "vertices", "shell", "solids"]);
