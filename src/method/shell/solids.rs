@@ -37,7 +37,7 @@ impl Solids {
     /// Uploads the textures; `None` where there are no solids.
     ///
     /// # Errors
-    /// [`Error::Device`] where one is too large, [`Error::OutOfMemory`].
+    /// [`Error::Device`](crate::Error::Device) where one is too large, [`Error::OutOfMemory`](crate::Error::OutOfMemory).
     pub fn new(gpu: &Arc<Gpu>, solids: &[Solid]) -> Result<Option<Self>> {
         let white = || Pyramid {
             levels: vec![Volume { size: [1; 3], texels: vec![[1.0; 4]], quantity: Quantity::Opacity }],
@@ -102,7 +102,7 @@ impl SolidView {
     /// moved off the surface before their shadow is looked up.
     ///
     /// # Errors
-    /// As [`Solids::new`], and [`Error::Interrupted`].
+    /// As [`Solids::new`], and [`Error::Interrupted`](crate::Error::Interrupted).
     #[expect(clippy::too_many_arguments, reason = "one pass has many inputs")]
     pub fn draw(
         &self,
