@@ -11,8 +11,8 @@ use bytemuck::{Pod, Zeroable};
 use glam::{DMat3, DVec2, DVec3};
 use rayon::prelude::*;
 
+use super::constants::{ViewConstants, constants_of_volume};
 use super::seen::{Cell, Tile};
-use super::{ViewConstants, constants_of_volume};
 use crate::Result;
 use crate::gpu::{
     Batch, Buffer, Draw, Gpu, Keeps, Pipeline, PipelineInfo, Sampled, Target, Texture3d, draw, shaders,

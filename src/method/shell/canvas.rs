@@ -1,0 +1,174 @@
+//! What a frame of one size and kind needs on the device beside the scene: its target, pipelines and the buffers of what is seen.
+
+use super::Shell;
+use super::constants::{ViewConstants, constants_of_volume};
+use super::lit::{Lit, LitView, Sight};
+use super::seen::{Run, Seen};
+use super::solids::SolidView;
+use crate::gpu::{Batch, Buffer, Keeps, Pipeline, PipelineInfo, Target, shaders};
+use crate::scene::{Model, View};
+use crate::{Error, Result};
+
+/// The target of a picture and the pipeline that draws into it.
+pub(super) struct Canvas {
+    kind: CanvasKind,
+    pub(super) target: Target,
+    sorted: Pipeline,
+    /// For cycles, where there are any.
+    cycle: Option<Pipeline>,
+    cells: Buffer,
+    tiles: Buffer,
+    members: Buffer,
+    /// In a lit scene.
+    pub(super) lit: Option<LitView>,
+    /// Where there are solids: their picture, and what lays it behind the medium.
+    pub(super) solids: Option<(SolidView, Pipeline)>,
+}
+
+impl Canvas {
+    /// By the binding that shaders name.
+    pub(super) fn buffers<'a>(&'a self, lit: Option<&'a Lit>) -> Vec<(u32, &'a Buffer)> {
+        let mut buffers = vec![(0, &self.cells), (1, &self.tiles), (2, &self.members)];
+        if let (Some(lit), Some(view)) = (lit, &self.lit) {
+            buffers.extend([(3, &view.cells), (4, &lit.frames)]);
+            buffers.extend(view.lights());
+        }
+        buffers
+    }
+
+    pub(super) fn batch(&self, run: &Run) -> Batch<'_> {
+        let (pipeline, quads) = match run {
+            Run::Sorted(cells) => (&self.sorted, cells),
+            Run::Cycle(tiles) => (self.cycle.as_ref().expect("built where there are cycles"), tiles),
+        };
+        Batch { pipeline, vertices: 6 * quads.start..6 * quads.end }
+    }
+}
+
+/// What a canvas depends on.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct CanvasKind {
+    width: u32,
+    height: u32,
+    depth: bool,
+    cycles: bool,
+    /// What is compiled into the shaders: what the scene has, and what is asked for.
+    switches: Vec<&'static str>,
+    /// Their specialisation constants.
+    constants: Vec<u32>,
+}
+
+impl Shell {
+    /// The canvas for this frame, with what was seen in its buffers: the one of the frame before, where it is of that kind.
+    /// `is_uploaded`: that has been seen in the frame before, too.
+    pub(super) fn canvas(
+        &self,
+        kept: Option<Canvas>,
+        kind: CanvasKind,
+        seen: &Seen,
+        view: &View,
+        is_uploaded: bool,
+    ) -> Result<Canvas> {
+        let Some(mut canvas) = kept.filter(|canvas| canvas.kind == kind) else {
+            return self.new_canvas(kind, seen, view);
+        };
+        if !is_uploaded {
+            canvas.cells.refill(&seen.cells)?;
+            canvas.tiles.refill(&seen.tiles)?;
+            canvas.members.refill(&seen.members)?;
+        }
+        if let (Some(lit), Some(kept), Some(sight)) = (&self.lit, &mut canvas.lit, self.sight(seen, view)) {
+            kept.refill(lit, sight, !is_uploaded)?;
+        }
+        Ok(canvas)
+    }
+
+    /// In a lit scene.
+    fn sight<'a>(&'a self, seen: &'a Seen, view: &'a View) -> Option<Sight<'a>> {
+        let shading = self.scene.shading.as_ref()?;
+        Some(Sight { shading, shadows: self.shadows(), shell: &self.scene.shell, seen, view })
+    }
+
+    pub(super) fn kind(&self, seen: &Seen, view: &View) -> CanvasKind {
+        let switches = [
+            ("DEPTH", view.depth),
+            ("SOLIDS", self.solids.is_some()),
+            ("LIT", self.lit.is_some()),
+            ("SHADOWS", self.shadows().is_some()),
+        ];
+        let mut constants = constants_of_volume(self.scene.march, seen.minified, &self.scene.volume).to_vec();
+        if let Some(shading) = &self.scene.shading {
+            constants.extend([shading.model == Model::Fibre, shading.emission.glow > 0.0].map(u32::from));
+        }
+        CanvasKind {
+            width: view.width,
+            height: view.height,
+            depth: view.depth,
+            cycles: !seen.tiles.is_empty(),
+            switches: switches.into_iter().filter_map(|(name, is_on)| is_on.then_some(name)).collect(),
+            constants,
+        }
+    }
+
+    fn new_canvas(&self, kind: CanvasKind, seen: &Seen, view: &View) -> Result<Canvas> {
+        let target = Target::new(&self.gpu, kind.width, kind.height, if kind.depth { 2 } else { 1 })?;
+        let on = &kind.switches;
+        let mut buffers = vec![0, 1, 2];
+        let mut textures = vec![8];
+        for &switch in on {
+            let (more_buffers, more_textures): (&[u32], &[u32]) = match switch {
+                "LIT" => (&[3, 4, 5], &[9]),
+                "SHADOWS" => (&[6], &[10, 11, 12, 13]),
+                "SOLIDS" => (&[], &[15]),
+                _ => (&[], &[]),
+            };
+            buffers.extend(more_buffers);
+            textures.extend(more_textures);
+        }
+        if on.contains(&"SHADOWS") && on.contains(&"SOLIDS") {
+            textures.push(14);
+        }
+        let info = PipelineInfo {
+            vertex: shaders::SHELL_VERT.with(on),
+            fragment: shaders::SHELL_FRAG.with(on),
+            constants: &kind.constants,
+            storage_buffers: &buffers,
+            textures: &textures,
+            push_constant_bytes: size_of::<ViewConstants>() as u32,
+            keeps: Keeps::Blend,
+        };
+        let sorted = Pipeline::new(&self.gpu, &target, &info)?;
+        let of_cycles = PipelineInfo {
+            vertex: shaders::TILE_VERT.with(on),
+            fragment: shaders::CYCLE_FRAG.with(on),
+            ..info
+        };
+        let cycle = kind.cycles.then(|| Pipeline::new(&self.gpu, &target, &of_cycles)).transpose()?;
+        let solids = self.solids.as_ref().map(|_| {
+            let layer = PipelineInfo {
+                vertex: shaders::LAYER_VERT.with(on),
+                fragment: shaders::LAYER_FRAG.with(on),
+                constants: &[],
+                storage_buffers: &[],
+                textures: &[15, 16],
+                ..info
+            };
+            Ok::<_, Error>((SolidView::new(&self.gpu, view, on)?, Pipeline::new(&self.gpu, &target, &layer)?))
+        });
+        let lit = match (&self.lit, self.sight(seen, view)) {
+            (Some(lit), Some(sight)) => Some(LitView::new(&self.gpu, lit, sight)?),
+            _ => None,
+        };
+        Ok(Canvas {
+            kind,
+            sorted,
+            cycle,
+            cells: Buffer::storage(&self.gpu, "the tetrahedra in order", &seen.cells)?,
+            tiles: Buffer::storage(&self.gpu, "the tiles of cycles", &seen.tiles)?,
+            members: Buffer::storage(&self.gpu, "the members of cycles", &seen.members)?,
+            lit,
+            solids: solids.transpose()?,
+            target,
+        })
+    }
+}

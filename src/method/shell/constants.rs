@@ -1,0 +1,107 @@
+//! What the shaders of the shell are told beside what they draw: push constants and specialisation constants.
+
+use bytemuck::{Pod, Zeroable};
+
+use crate::scene::{March, Scene, View};
+use crate::volume::{Pyramid, Quantity};
+
+/// The push constants of `glsl/include/shell.glsl`: see there for each member.
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+#[repr(C)]
+#[allow(missing_docs, reason = "documented at the one declaration in glsl")]
+pub struct ViewConstants {
+    pub centre: [f32; 2],
+    pub pixel: f32,
+    pub near: f32,
+    pub texels: [f32; 3],
+    pub last_level: f32,
+    pub lod_scale: f32,
+    pub per_opacity_distance: f32,
+    pub step: f32,
+    pub samples: u32,
+}
+
+/// Passes through loops that a ray makes in one tetrahedron at most: a bound of `sample_count` and `march_exactly` in
+/// `glsl/include`, and of lavapipe, which ends all loops of a pixel there.
+pub(super) const MOST_SAMPLES: f64 = 65535.0;
+
+/// How many samples the plan wants along a ray that passes so many texels of the full volume in a tetrahedron, at most.
+pub(super) fn wanted_samples(march: March, texels: f64) -> f64 {
+    match march {
+        March::Default { step } => texels / step,
+        March::Paper { samples } => f64::from(samples),
+        // A ray passes planes of texels on three axes, of two levels, and each piece may be cut in 16.
+        March::Exact => 3.0 * (1.0 + 0.5) * 17.0 * texels,
+    }
+}
+
+/// Texels a sample in cycles under the exact plan.
+const CYCLE_STEP: f64 = 0.125;
+
+/// The specialisation constant `PLAN` of `glsl/include/march.glsl`.
+fn plan(march: March) -> u32 {
+    match march {
+        March::Default { .. } => 0,
+        March::Paper { .. } => 1,
+        March::Exact => 2,
+    }
+}
+
+/// The specialisation constants of `glsl/include/sample.glsl`.
+pub(super) fn constants_of_volume(march: March, minified: bool, volume: &Pyramid) -> [u32; 3] {
+    let is_extinction = volume.levels[0].quantity == Quantity::Extinction;
+    [plan(march), u32::from(minified), u32::from(is_extinction)]
+}
+
+impl ViewConstants {
+    /// What is known of a volume, and nothing else.
+    pub(super) fn of_volume(volume: &Pyramid) -> Self {
+        Self {
+            texels: volume.levels[0].size.map(|side| side as f32),
+            last_level: (volume.levels.len() - 1) as f32,
+            ..Self::zeroed()
+        }
+    }
+}
+
+/// The push constants of a view; `unit`: see [`Seen::unit`](super::seen::Seen::unit).
+pub(super) fn constants(scene: &Scene, view: &View, unit: f64) -> ViewConstants {
+    let pixel = view.pixel_at_unit_depth();
+    let (step, samples) = match scene.march {
+        March::Paper { samples } => (1.0, samples),
+        March::Default { step } => (step, 1),
+        // Of cycles alone, which are always marched by midpoints.
+        March::Exact => (CYCLE_STEP, 1),
+    };
+    ViewConstants {
+        centre: [0.5 * view.width as f32, 0.5 * view.height as f32],
+        pixel: pixel as f32,
+        near: (view.camera.near / unit) as f32,
+        lod_scale: (scene.medium.lod_footprint * pixel) as f32,
+        per_opacity_distance: (unit / scene.medium.opacity_distance) as f32,
+        step: step as f32,
+        samples,
+        ..ViewConstants::of_volume(&scene.volume)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn plans_have_the_numbers_of_the_shader() {
+        let shader = include_str!("../../../glsl/include/sample.glsl");
+        for (name, march) in
+            [("DEFAULT", March::default()), ("PAPER", March::Paper { samples: 1 }), ("EXACT", March::Exact)]
+        {
+            assert!(shader.contains(&format!("const uint PLAN_{name} = {};", plan(march))), "{name}");
+        }
+    }
+
+    #[test]
+    fn host_and_shader_agree_on_the_most_samples() {
+        let shader = include_str!("../../../glsl/include/sample.glsl");
+        assert!(shader.contains(&format!("clamp(ceil(texels / view.step), 1.0, {MOST_SAMPLES:.1})")));
+    }
+}

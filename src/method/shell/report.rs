@@ -1,0 +1,79 @@
+//! The report of a frame: what it counted, what it skipped and why, and what the user should know.
+
+use super::Shell;
+use super::constants::{MOST_SAMPLES, wanted_samples};
+use super::seen::Seen;
+use crate::frame::Report;
+use crate::order::Sorted;
+use crate::shell::Limit;
+
+impl Shell {
+    /// Without stages, and without what was kept of the frame before.
+    pub(super) fn report(&self, sorted: &Sorted, seen: &Seen, rgba: &[[f32; 4]]) -> Report {
+        let health = self.scene.shell.health;
+        let mut report =
+            Report { method: "shell".into(), device: self.gpu.info().name.clone(), ..Report::default() };
+        let mut count = |name: &str, value: u64| report.counts.insert(name.to_owned(), value);
+        count("tetrahedra", health.tetrahedra);
+        count("tetrahedra_drawn", seen.cells.len() as u64);
+        count("face_relations", sorted.face_relations);
+        count("image_relations", sorted.image_relations);
+        count("cycles", sorted.order.cycles.len() as u64);
+        count("tetrahedra_in_cycles", sorted.cycle_members);
+        count("pixels_covered", rgba.iter().filter(|pixel| pixel[3] > 0.0).count() as u64);
+        let triangles = self.scene.solids.iter().map(|solid| solid.mesh.triangles.len() as u64).sum::<u64>();
+        if triangles > 0 {
+            count("solid_triangles", triangles);
+        }
+        if let Some(shadows) = self.shadows() {
+            count("shadow_pictures", shadows.pictures() as u64);
+        }
+        if seen.before_near > 0 {
+            report.skipped.push(format!("{} tetrahedra lie before the near plane", seen.before_near));
+        }
+        if seen.beside > 0 {
+            report.skipped.push(format!("{} tetrahedra lie beside the picture", seen.beside));
+        }
+        if health.zero_volume > 0 {
+            report.skipped.push(format!("{} tetrahedra have no volume", health.zero_volume));
+        }
+        if sorted.order.cycles.is_empty() {
+            report
+                .skipped
+                .push("no tetrahedra hide one another in a cycle: nothing is resolved per pixel".into());
+        }
+        if !seen.minified {
+            report.skipped.push("all is magnified: no level of detail but 0 is compiled in".into());
+        }
+        match (&self.scene.shading, &self.shadows) {
+            (None, _) => report.skipped.push("the scene is unlit: nothing of light is compiled in".into()),
+            (_, Some(None)) => {
+                report.skipped.push("no light casts shadows: nothing of them is compiled in".into());
+            }
+            _ => {}
+        }
+        if let Some(Limit { vertices, least, at }) = self.scene.shell.limit {
+            report.counts.insert("vertices_limited".to_owned(), vertices);
+            let [x, y, z] = at.to_array();
+            report.skipped.push(format!(
+                "the shell is thinner than asked at {vertices} vertices, so that it does not fold: {least:.3} of it at \
+                 ({x:.4}, {y:.4}, {z:.4})"
+            ));
+        }
+        if health.inverted > 0 {
+            report.warnings.push(format!(
+                "{} of {} tetrahedra are inverted: the shell folds; make it thinner, smooth its directions, or let it give way by shell.limit = \"safe\"",
+                health.inverted, health.tetrahedra
+            ));
+        }
+        let wanted = wanted_samples(self.scene.march, self.texels);
+        if wanted > MOST_SAMPLES {
+            report.warnings.push(format!(
+                "a ray may pass {:.0} texels in one tetrahedron, and want {wanted:.0} samples there; it takes at most \
+                 {MOST_SAMPLES}, so that what is seen there may be coarse or cut short: make shell.uv_scale smaller",
+                self.texels
+            ));
+        }
+        report
+    }
+}
