@@ -87,17 +87,24 @@ impl Error {
         Self::Input { path: path.as_ref().to_owned(), message: message.into(), help: None }
     }
 
+    /// What it says and what it advises; `None` of an interrupt, which needs no words.
+    fn words(&mut self) -> Option<(&mut String, &mut Option<String>)> {
+        match self {
+            Self::Usage { message, help }
+            | Self::Input { message, help, .. }
+            | Self::Text { message, help, .. }
+            | Self::Device { message, help }
+            | Self::OutOfMemory { message, help }
+            | Self::Output { message, help, .. } => Some((message, help)),
+            Self::Interrupted => None,
+        }
+    }
+
     /// The same error with advice in place of what advice it had.
     #[must_use]
     pub fn with_help(mut self, advice: impl Into<String>) -> Self {
-        match &mut self {
-            Self::Usage { help, .. }
-            | Self::Input { help, .. }
-            | Self::Text { help, .. }
-            | Self::Device { help, .. }
-            | Self::OutOfMemory { help, .. }
-            | Self::Output { help, .. } => *help = Some(advice.into()),
-            Self::Interrupted => {}
+        if let Some((_, help)) = self.words() {
+            *help = Some(advice.into());
         }
         self
     }
@@ -105,14 +112,8 @@ impl Error {
     /// The same error, said to be of something: `"frame 12"`.
     #[must_use]
     pub fn of(mut self, what: &str) -> Self {
-        match &mut self {
-            Self::Usage { message, .. }
-            | Self::Input { message, .. }
-            | Self::Text { message, .. }
-            | Self::Device { message, .. }
-            | Self::OutOfMemory { message, .. }
-            | Self::Output { message, .. } => *message = format!("{what}: {message}"),
-            Self::Interrupted => {}
+        if let Some((message, _)) = self.words() {
+            *message = format!("{what}: {message}");
         }
         self
     }
