@@ -31,6 +31,7 @@
 pub mod bench;
 pub mod error;
 pub mod film;
+pub mod fingerprint;
 pub mod frame;
 pub mod gpu;
 mod input;

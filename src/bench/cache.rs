@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use super::file::write_whole;
-use super::fingerprint::Fingerprint;
+use crate::fingerprint::Fingerprint;
 use crate::frame::{Frame, Image};
 use crate::progress::{Interrupt, Progress};
 use crate::scene::Scene;

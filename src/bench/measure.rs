@@ -6,10 +6,10 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use super::cache;
-use super::fingerprint::Fingerprint;
 use super::remaining::Remaining;
 use super::results::{Point, SceneResults};
 use super::sweep::Setting;
+use crate::fingerprint::Fingerprint;
 use crate::frame::{Backdrop, Frame, Image};
 use crate::method::{self, Method, Setup};
 use crate::progress::{Progress, Silent};

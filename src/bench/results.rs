@@ -9,9 +9,9 @@ use serde::{Deserialize, Serialize};
 
 use super::environment::Environment;
 use super::file::write_whole;
-use super::fingerprint::Fingerprint;
 use super::sweep::{Setting, Sweep};
 use super::{convergence, pareto};
+use crate::fingerprint::Fingerprint;
 use crate::frame::Stage;
 use crate::metric::Metrics;
 use crate::{Error, Result};

@@ -3,8 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use mesoshell::bench::fingerprint::Fingerprint;
 use mesoshell::bench::pilot::{self, Estimate, Trial};
+use mesoshell::fingerprint::Fingerprint;
 use mesoshell::frame::Image;
 use mesoshell::method::{Entry, Setup};
 use mesoshell::scene::{March, Scene};

@@ -198,7 +198,10 @@ fn render(arguments: &Arguments, line: &Arc<FrameLine>, interrupt: &Interrupt) -
     let setup = Setup { device: &device, validation: messages.as_ref(), progress: &progress, interrupt };
     let entry = method::by_name(&arguments.method).expect("clap lets through the names of the table alone");
     let opened = (entry.open)(&setup)?;
-    let mut marker = Marker::new(entry.name, &opened.device(), arguments.pixels())?;
+    let mut marker = match &output {
+        Output::Pictures(_) => Some(Marker::new(entry.name, &opened.device(), arguments.pixels())?),
+        Output::Film(..) => None,
+    };
     let mut stage = Stage { opened: Some(opened), method: None };
 
     let mut done = Rendered {
@@ -221,7 +224,7 @@ fn render(arguments: &Arguments, line: &Arc<FrameLine>, interrupt: &Interrupt) -
         interrupt.check()?;
         let of_frame = |error: Error| error.of(&name);
         let mut mark = None;
-        if let Output::Pictures(names) = &output {
+        if let (Output::Pictures(names), Some(marker)) = (&output, &mut marker) {
             let path = names.of(frame);
             let inputs = sequence.inputs(frame).map_err(of_frame)?;
             let made = marker.mark(&inputs).map_err(of_frame)?;

@@ -4,6 +4,7 @@
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
+use crate::fingerprint::{Builder, Fingerprint};
 use crate::frame::file;
 use crate::scene::FrameInputs;
 use crate::{Error, Result, input};
@@ -11,10 +12,10 @@ use crate::{Error, Result, input};
 /// Makes the marks of frames.
 #[derive(Debug)]
 pub struct Marker {
-    /// Of all that makes them beside their scenes.
-    making: blake3::Hash,
+    /// With all that makes them beside their scenes.
+    making: Builder,
     /// Of files: each is read once.
-    hashes: HashMap<PathBuf, blake3::Hash>,
+    files: HashMap<PathBuf, Fingerprint>,
 }
 
 impl Marker {
@@ -25,50 +26,34 @@ impl Marker {
     pub fn new(method: &str, device: &str, size: Option<[u32; 2]>) -> Result<Self> {
         let program = std::env::current_exe()
             .map_err(|error| Error::input("the program", format!("cannot be found: {error}")))?;
-        let mut fields = Fields(blake3::Hasher::new());
-        fields.add(of_file(&program)?.as_bytes());
-        fields.add(method.as_bytes());
-        fields.add(device.as_bytes());
-        fields.add(bytemuck::bytes_of(&size.unwrap_or_default()));
-        Ok(Self { making: fields.0.finalize(), hashes: HashMap::new() })
+        let making = Fingerprint::builder("frame")
+            .bytes(of_file(&program)?.to_string().as_bytes())
+            .bytes(method.as_bytes())
+            .bytes(device.as_bytes())
+            .numbers(&size.unwrap_or_default());
+        Ok(Self { making, files: HashMap::new() })
     }
 
-    /// The mark of a frame: 32 hexadecimal digits, the same on every run.
+    /// The mark of a frame: the same on every run.
     ///
     /// # Errors
     /// [`Error::Input`] where a file that the scene names cannot be read.
     pub fn mark(&mut self, inputs: &FrameInputs) -> Result<String> {
-        let mut fields = Fields(blake3::Hasher::new());
-        fields.add(self.making.as_bytes());
-        fields.add(inputs.text.as_bytes());
+        let mut mark = self.making.clone().bytes(inputs.text.as_bytes());
         for path in &inputs.files {
-            let hash = match self.hashes.get(path) {
-                Some(hash) => *hash,
-                None => of_file(path)?,
-            };
-            self.hashes.insert(path.clone(), hash);
-            fields.add(path.to_string_lossy().as_bytes());
-            fields.add(hash.as_bytes());
+            if !self.files.contains_key(path) {
+                self.files.insert(path.clone(), of_file(path)?);
+            }
+            let content = self.files[path].to_string();
+            mark = mark.bytes(path.to_string_lossy().as_bytes()).bytes(content.as_bytes());
         }
-        Ok(fields.0.finalize().to_hex()[..32].to_owned())
+        Ok(mark.finish().to_string())
     }
 }
 
-struct Fields(blake3::Hasher);
-
-impl Fields {
-    /// The length goes in first, so that two fields never run into one.
-    fn add(&mut self, field: &[u8]) {
-        self.0.update(&(field.len() as u64).to_le_bytes()).update(field);
-    }
-}
-
-fn of_file(path: &Path) -> Result<blake3::Hash> {
-    let unreadable = |error: std::io::Error| Error::input(path, format!("cannot be read: {error}"));
-    let (file, _) = input::open(path).map_err(unreadable)?;
-    let mut hasher = blake3::Hasher::new();
-    hasher.update_reader(file).map_err(unreadable)?;
-    Ok(hasher.finalize())
+fn of_file(path: &Path) -> Result<Fingerprint> {
+    let read = input::open(path).and_then(|(file, _)| Fingerprint::of_bytes(file));
+    read.map_err(|error| Error::input(path, format!("cannot be read: {error}")))
 }
 
 /// Whether the picture at `path` bears this mark: is there, whole, and up to date.

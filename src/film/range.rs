@@ -2,7 +2,7 @@
 
 use std::str::FromStr;
 
-use super::super::scene::Timeline;
+use crate::scene::Timeline;
 use crate::{Error, Result};
 
 /// Some frames of a film.

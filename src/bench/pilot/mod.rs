@@ -16,7 +16,7 @@ use search::Next;
 use serde::{Deserialize, Serialize};
 use trials::Trials;
 
-use super::fingerprint::Fingerprint;
+use crate::fingerprint::Fingerprint;
 use crate::gpu::{Gpu, shaders};
 use crate::method::{Entry, Setup};
 use crate::progress::{Progress, Silent};

@@ -6,9 +6,9 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use super::super::file::write_whole;
-use super::super::fingerprint::Fingerprint;
 use super::Trial;
 use crate::Result;
+use crate::fingerprint::Fingerprint;
 
 const FORMAT: &str = "mesoshell pilot 1";
 
