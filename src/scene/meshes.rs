@@ -4,7 +4,8 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::file::MeshSection;
-use super::numbered::{self, Moment};
+use super::numbered;
+use super::timeline::Moment;
 use crate::mesh::{Mesh, Projection, obj};
 use crate::{Error, Result};
 

@@ -19,6 +19,7 @@
 
 mod backdrop;
 pub mod camera;
+mod cameras;
 pub mod file;
 mod files;
 mod lighting;
@@ -30,7 +31,6 @@ mod parts;
 mod sequence;
 pub mod shading;
 pub mod shadow;
-mod sight;
 pub mod solid;
 mod solids;
 mod source;

@@ -42,35 +42,6 @@ pub(super) fn files(path: &Path) -> Result<Option<Vec<PathBuf>>> {
     Ok(Some(found.into_iter().map(|(_, path)| path).collect()))
 }
 
-/// When a frame is, and how what plays by itself goes on at its end.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Moment {
-    /// Seconds.
-    pub time: f64,
-    /// From the beginning again; else it stands still.
-    pub loops: bool,
-}
-
-impl Moment {
-    /// Which of `count` files of `rate` a second is shown, `time` seconds after the first.
-    pub(super) fn file(self, count: usize, rate: f64, time: Option<f64>) -> usize {
-        // A time that is a whole number of files, but for rounding, is the beginning of that file.
-        let files = (time.unwrap_or(self.time) * rate + 1e-6).floor().max(0.0);
-        let file = files as usize;
-        if self.loops { file % count } else { file.min(count - 1) }
-    }
-
-    /// As [`Moment::file`], with the file that comes after it, and how far towards that it is, 0..1.
-    pub(super) fn between(self, count: usize, rate: f64, time: Option<f64>) -> (usize, usize, f64) {
-        let from = self.file(count, rate, time);
-        let to = if self.loops { (from + 1) % count } else { (from + 1).min(count - 1) };
-        let files = (time.unwrap_or(self.time) * rate).max(0.0);
-        // What is a whole number but for rounding shows one file alone.
-        let part = (files - (files + 1e-6).floor()).max(0.0);
-        (from, to, if from == to { 0.0 } else { part })
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -92,20 +63,5 @@ mod tests {
             let error = files(&path(name)).unwrap_err().to_string();
             assert!(error.contains(part) && error.contains(name), "{error}");
         }
-    }
-
-    #[test]
-    fn moments_have_files() {
-        let file = |time: f64, loops: bool, own: Option<f64>| Moment { time, loops }.file(4, 10.0, own);
-        assert_eq!([0.0, 0.09, 0.1, 0.3 - 1e-9, 0.3].map(|time| file(time, false, None)), [0, 0, 1, 3, 3]);
-        assert_eq!([0.4, 0.55].map(|time| file(time, false, None)), [3, 3]);
-        assert_eq!([0.4, 0.55].map(|time| file(time, true, None)), [0, 1]);
-        assert_eq!(file(0.4, true, Some(0.2)), 2, "its own time");
-        assert_eq!(file(0.0, false, Some(-1.0)), 0);
-        let between = |time: f64, loops: bool| Moment { time, loops }.between(4, 8.0, None);
-        assert_eq!(between(0.125 - 1e-9, false), (1, 2, 0.0), "but for rounding");
-        assert_eq!(between(0.15625, false), (1, 2, 0.25));
-        assert_eq!([between(0.40625, false), between(9.0, false)], [(3, 3, 0.0); 2]);
-        assert_eq!(between(0.40625, true), (3, 0, 0.25));
     }
 }

@@ -15,16 +15,18 @@ use super::lighting::Lighting;
 use super::load::Loaded;
 use super::meshes::{Between, MeshFiles};
 use super::motion::Motion;
-use super::numbered::Moment;
 use super::solids::Solids;
 use super::source::{MeshSource, VolumeSource};
 use super::text::Text;
-use super::thickness::ThicknessMap;
-use super::{Camera, March, Medium, Model, Scene, Sizes, Solid, View, backdrop, sight, span, texel_edges};
+use super::timeline::Moment;
+use super::{
+    Camera, March, Medium, Model, Scene, Sizes, Solid, View, backdrop, cameras, span, texel_edges, thickness,
+};
 use crate::frame::{Backdrop, Stopwatch};
 use crate::mesh::Mesh;
 use crate::progress::{Progress, Silent};
 use crate::shell::{Shell, ShellOptions, Wind};
+use crate::volume::grey::Grey;
 use crate::volume::{Directions, Haze, Pyramid};
 use crate::{Error, Result};
 
@@ -68,8 +70,8 @@ struct Texels {
     section: VolumeSection,
     /// Which of a sequence.
     file: Option<PathBuf>,
-    /// The opacity distance as [`Checked::opacity_distance`] tells it and the shell's thickness, where there is haze.
-    haze: Option<(Option<f64>, f64)>,
+    /// In thicknesses of the shell, where there is haze: see [`VolumeWork::opacity_distance`].
+    haze: Option<Option<f64>>,
     /// The shell whose texels are filtered, and its opacity distance.
     rest: (Same<Shell>, Option<f64>),
 }
@@ -93,7 +95,7 @@ type OfSolids = (Same<Solids>, Option<Same<Mesh>>);
 struct VolumeWork {
     source: VolumeSource,
     section: VolumeSection,
-    thickness: f64,
+    /// In thicknesses of the shell; without one it is a texel along w.
     opacity_distance: Option<f64>,
     rest: Rest,
 }
@@ -110,14 +112,10 @@ impl VolumeWork {
         progress.stage("loading the volume");
         let mut volume = self.source.load(admit, resolve)?;
         let layers = f64::from(volume.size[2]);
-        let distance = |explicit: Option<f64>, thickness: f64| explicit.unwrap_or(thickness / layers);
-        let texel = {
-            let distance = distance(self.rest.opacity_distance, self.rest.thickness);
-            texel_edges(&self.rest.shell, volume.size).map(|edge| edge / distance)
-        };
+        let rest_distance = self.rest.opacity_distance.unwrap_or(self.rest.thickness / layers);
+        let texel = texel_edges(&self.rest.shell, volume.size).map(|edge| edge / rest_distance);
         if let Some(HazeSection { alpha, colour }) = &self.section.haze {
-            let distance = distance(self.opacity_distance, self.thickness);
-            let depth = -(-alpha.0).ln_1p() * distance / self.thickness;
+            let depth = -(-alpha.0).ln_1p() * self.opacity_distance.unwrap_or(layers.recip());
             Haze { colour: colour.0, depth }.fill(&mut volume);
         }
         lap("load.volume");
@@ -141,7 +139,7 @@ pub(super) struct Parts {
     mesh: Kept<(MeshSection, Option<Between>), Arc<Mesh>>,
     mesh_files: MeshFiles,
     moved: Kept<(Same<Mesh>, Motion), Arc<Mesh>>,
-    thickness_map: Kept<PathBuf, Arc<ThicknessMap>>,
+    thickness_map: Kept<PathBuf, Arc<Grey>>,
     shell: Kept<(Same<Mesh>, ShellOptions), Arc<Shell>>,
     /// The shell before that, whose memory the next may have.
     spare: Option<Arc<Shell>>,
@@ -179,7 +177,7 @@ impl<'a> Checked<'a> {
         moment: Moment,
     ) -> Result<Self> {
         Ok(Self {
-            camera: sight::camera(text, file)?,
+            camera: cameras::camera(text, file)?,
             mesh: MeshSource::of(text, &file.mesh, base_dir, moment)?,
             motion: Motion::of(text, file.mesh.get_ref().transform.as_ref(), &file.deform)?,
             wind: file.shell.wind.as_ref().map(|wind| wind.wind(text)).transpose()?,
@@ -216,15 +214,16 @@ impl<'a> Checked<'a> {
     /// How its volume is made, and what that depends on.
     fn volume_work(&self, rest: &Rest) -> (Texels, VolumeWork) {
         let section = self.file.volume.get_ref();
-        let (thickness, opacity_distance) = (self.file.shell.thickness.0, self.opacity_distance());
+        let thickness = self.file.shell.thickness.0;
+        let opacity_distance = self.opacity_distance().map(|distance| distance / thickness);
         let texels = Texels {
             section: section.texels(),
             file: self.volume.path().map(Path::to_owned),
-            haze: section.haze.as_ref().map(|_| (opacity_distance, thickness)),
+            haze: section.haze.as_ref().map(|_| opacity_distance),
             rest: (Same(rest.shell.clone()), rest.opacity_distance),
         };
         let (source, section, rest) = (self.volume.clone(), section.clone(), rest.clone());
-        (texels, VolumeWork { source, section, thickness, opacity_distance, rest })
+        (texels, VolumeWork { source, section, opacity_distance, rest })
     }
 
     /// Blames a texture that is too fine on who made it so.
@@ -265,9 +264,9 @@ impl Parts {
             Ok(Arc::new(moved))
         })?;
         let thickness_map = checked.file.shell.thickness_map.as_ref().map(|file| {
-            self.thickness_map.get(checked.base_dir.join(file), |path| ThicknessMap::read(path).map(Arc::new))
+            self.thickness_map.get(checked.base_dir.join(file), |path| thickness::read(path).map(Arc::new))
         });
-        let scale = thickness_map.transpose()?.map_or_else(Vec::new, |map| map.factors(&mesh));
+        let scale = thickness_map.transpose()?.map_or_else(Vec::new, |map| thickness::factors(&map, &mesh));
         let before = self.shell.0.as_ref().map(|(_, shell)| shell.clone());
         let spare = &mut self.spare;
         let shell = self.shell.get((Same(mesh.clone()), checked.shell_options(scale)), |(_, options)| {

@@ -4,10 +4,9 @@ use std::path::{Path, PathBuf};
 
 use super::file::SceneFile;
 use super::load::Loaded;
-use super::numbered::Moment;
 use super::parts::{Checked, Parts, Rest};
 use super::text::Text;
-use super::timeline::{Timeline, Track};
+use super::timeline::{Moment, Timeline, Track};
 use super::{Sizes, files, load, meshes, source};
 use crate::progress::Progress;
 use crate::{Error, Result};
@@ -42,23 +41,29 @@ impl Sequence {
     /// # Errors
     /// As [`load`](super::load()); an error in a frame names the tracks that make it.
     pub fn open(path: &Path, overrides: &[String]) -> Result<Self> {
-        Self::of(load::text(path, overrides)?, path.parent().unwrap_or(Path::new("")))
+        let sequence = Self::of(load::text(path, overrides)?, path.parent().unwrap_or(Path::new("")))?;
+        sequence.check_frames()?;
+        Ok(sequence)
     }
 
-    /// Of a text whose paths start in `base_dir`.
+    /// Of a text whose paths start in `base_dir`; its frames are checked when they are asked for.
     pub(super) fn of(text: Text, base_dir: &Path) -> Result<Self> {
         let file: SceneFile = load::read(&text)?;
         let timeline = Timeline::of(file.timeline.as_ref());
         let tracks = Track::all(&text, &file, &timeline)?;
         let base_dir = base_dir.to_owned();
-        let sequence = Self { text, base_dir, timeline, tracks, parts: Parts::default(), rest: None };
-        for frame in 1..=if sequence.tracks.is_empty() { 1 } else { timeline.frames } {
-            let text = sequence.text_at(frame)?;
-            Checked::new(&text, &load::read(&text)?, &sequence.base_dir, sequence.moment(frame))?;
+        Ok(Self { text, base_dir, timeline, tracks, parts: Parts::default(), rest: None })
+    }
+
+    /// All that can be wrong in a frame, but for what its files hold; sequences of files are read, to see that they fit together.
+    fn check_frames(&self) -> Result<()> {
+        for frame in 1..=if self.tracks.is_empty() { 1 } else { self.timeline.frames } {
+            let text = self.text_at(frame)?;
+            Checked::new(&text, &load::read(&text)?, &self.base_dir, self.moment(frame))?;
         }
-        meshes::check_all(file.mesh.get_ref(), &sequence.base_dir)?;
-        source::check_volumes(file.volume.get_ref(), &sequence.base_dir)?;
-        Ok(sequence)
+        let file = load::read(&self.text)?;
+        meshes::check_all(file.mesh.get_ref(), &self.base_dir)?;
+        source::check_volumes(file.volume.get_ref(), &self.base_dir)
     }
 
     /// How long it lasts.

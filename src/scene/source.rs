@@ -6,8 +6,9 @@ use toml::Spanned;
 
 use super::file::{self, DensitySection, MeshSection, VolumeSection};
 use super::meshes::{Between, MeshFiles};
-use super::numbered::{self, Moment};
+use super::numbered;
 use super::text::Text;
+use super::timeline::Moment;
 use crate::mesh::generate::Generator;
 use crate::mesh::projection::Projection;
 use crate::mesh::{Mesh, obj};

@@ -2,82 +2,39 @@
 
 use std::path::Path;
 
-use glam::DVec2;
-
+use crate::Result;
 use crate::mesh::Mesh;
-use crate::volume::stack;
-use crate::{Error, Result};
+use crate::volume::grey::Grey;
 
-/// A grey picture that repeats.
-pub(super) struct ThicknessMap {
-    /// Pixels along u and v.
-    size: [usize; 2],
-    /// 0..1, row by row, upwards.
-    values: Vec<f64>,
+/// Reads the picture.
+///
+/// # Errors
+/// [`Error::Input`](crate::Error::Input) where it cannot be read or is damaged.
+pub(super) fn read(path: &Path) -> Result<Grey> {
+    Grey::read(path).map_err(|error| {
+        error.with_help("shell.thickness_map is a PNG picture, its name relative to the scene file")
+    })
 }
 
-impl ThicknessMap {
-    /// Reads a PNG picture: grey as the fraction of its full range, a colour as its linear luminance.
-    ///
-    /// # Errors
-    /// [`Error::Input`] where it cannot be read or is damaged.
-    pub(super) fn read(path: &Path) -> Result<Self> {
-        let help = "shell.thickness_map is a PNG picture, its name relative to the scene file";
-        if path.is_dir() {
-            return Err(Error::input(path, "is a folder, not a picture").with_help(help));
+/// The factor at every position: the mean over the corners of triangles there, which differ at seams. A position of no triangle has 1.
+pub(super) fn factors(map: &Grey, mesh: &Mesh) -> Vec<f64> {
+    let mut sums = vec![(0.0, 0.0); mesh.positions.len()];
+    for (ids, uvs) in mesh.triangles.iter().zip(&mesh.uvs) {
+        for (&id, &uv) in ids.iter().zip(uvs) {
+            let (sum, count) = &mut sums[id as usize];
+            // Whole repeats would take digits from what is left of them in f32.
+            let place = (uv - uv.floor()).as_vec2();
+            *sum += f64::from(map.between(place.x, place.y));
+            *count += 1.0;
         }
-        let raw = stack::read(path).map_err(|error| error.with_help(help))?;
-        if raw.size[2] != 1 {
-            return Err(Error::input(path, format!("stands for {} pictures, not for one", raw.size[2]))
-                .with_help(help));
-        }
-        let luminance = |pixel: &[f32]| match *pixel {
-            [red, green, blue, ..] => 0.2126 * red + 0.7152 * green + 0.0722 * blue,
-            _ => pixel[0],
-        };
-        let (width, channels) = (raw.size[0] as usize, raw.channels as usize);
-        let rows = raw.values.chunks_exact(width * channels).rev();
-        // Roundings must not make a full thickness larger.
-        let value = |pixel| f64::from(luminance(pixel)).clamp(0.0, 1.0);
-        let values: Vec<f64> = rows.flat_map(|row| row.chunks_exact(channels)).map(value).collect();
-        Ok(Self { size: [width, values.len() / width], values })
     }
-
-    /// The factor at every position: the mean over the corners of triangles there, which differ at seams. A position of no triangle
-    /// has 1.
-    pub(super) fn factors(&self, mesh: &Mesh) -> Vec<f64> {
-        let mut sums = vec![(0.0, 0.0); mesh.positions.len()];
-        for (ids, uvs) in mesh.triangles.iter().zip(&mesh.uvs) {
-            for (&id, &uv) in ids.iter().zip(uvs) {
-                let (sum, count) = &mut sums[id as usize];
-                *sum += self.at(uv);
-                *count += 1.0;
-            }
-        }
-        sums.into_iter().map(|(sum, count)| if count > 0.0 { sum / count } else { 1.0 }).collect()
-    }
-
-    /// Interpolated between the centres of pixels.
-    fn at(&self, uv: DVec2) -> f64 {
-        let [width, height] = self.size;
-        let size = DVec2::new(width as f64, height as f64);
-        let place = (uv - uv.floor()) * size - 0.5;
-        let (first, part) = (place.floor(), place - place.floor());
-        let pixel = |right: i64, up: i64| {
-            let x = (first.x as i64 + right).rem_euclid(width as i64) as usize;
-            let y = (first.y as i64 + up).rem_euclid(height as i64) as usize;
-            self.values[y * width + x]
-        };
-        let row = |up: i64| pixel(0, up) * (1.0 - part.x) + pixel(1, up) * part.x;
-        row(0) * (1.0 - part.y) + row(1) * part.y
-    }
+    sums.into_iter().map(|(sum, count)| if count > 0.0 { sum / count } else { 1.0 }).collect()
 }
 
 #[cfg(test)]
 mod tests {
     use image::{GrayImage, Luma};
 
-    use super::*;
     use crate::scene::parse;
 
     const SCENE: &str = "mesh = { generator = 'plane', size = 2, segments = 8 }
@@ -123,14 +80,6 @@ thickness_map = 'map.png'
             }
             assert!(seen.iter().all(|&count| count > 50), "{seen:?}");
             assert!(shell.limit.is_none(), "what is flat does not fold: {:?}", shell.limit);
-        }
-    }
-
-    #[test]
-    fn it_repeats_and_is_interpolated() {
-        let map = ThicknessMap { size: [2, 1], values: vec![0.0, 1.0] };
-        for (u, expected) in [(0.25, 0.0), (0.75, 1.0), (0.5, 0.5), (0.0, 0.5), (-0.75, 0.0), (7.375, 0.25)] {
-            assert_eq!(map.at(DVec2::new(u, 3.3)), expected, "u {u}");
         }
     }
 

@@ -3,6 +3,7 @@
 mod contact;
 mod directions;
 mod file;
+pub(crate) mod grey;
 mod haze;
 mod interpretation;
 mod ktx2_file;

@@ -13,9 +13,9 @@ use super::grid::{Grid, premultiplied, smoothstep};
 use super::keys::keys;
 use super::noise::Octaves;
 use super::{Pattern, Source};
+use crate::Result;
 use crate::value::Colour;
-use crate::volume::stack;
-use crate::{Error, Result};
+use crate::volume::grey::Grey;
 
 keys! {
     /// The keys of `recipe = "height-map"`.
@@ -47,15 +47,7 @@ const FINER: usize = 3;
 #[derive(Debug)]
 struct Relief {
     keys: HeightMap,
-    image: Map,
-}
-
-/// Numbers on a grid that repeats.
-#[derive(Debug, Clone)]
-struct Map {
-    size: [usize; 2],
-    /// 0..1, row by row.
-    values: Vec<f32>,
+    image: Grey,
 }
 
 /// Reads the keys and the image that they name.
@@ -66,37 +58,12 @@ pub(super) fn read(source: &Source, table: DeTable) -> Result<impl Pattern + use
         return Err(source.error(0..0, "`image` must be given".into(), "no image").with_help(help));
     }
     let path = source.folder.join(&keys.image);
-    if path.is_dir() {
-        return Err(Error::input(&path, "is a folder, not an image"));
-    }
-    let raw = stack::read(&path)?;
-    let luminance = |pixel: &[f32]| match *pixel {
-        [red, green, blue, ..] => 0.2126 * red + 0.7152 * green + 0.0722 * blue,
-        _ => pixel[0],
-    };
-    let width = raw.size[0] as usize;
-    let channels = raw.channels as usize;
-    // The last row comes first, since v goes up.
-    let rows = raw.values.chunks_exact(width * channels).rev();
-    let values: Vec<f32> = rows.flat_map(|row| row.chunks_exact(channels)).map(luminance).collect();
-    let image = Map { size: [width, values.len() / width], values };
+    let image = Grey::read(&path)?;
     Ok(Relief { keys, image })
 }
 
-impl Map {
-    fn at(&self, x: i64, y: i64) -> f32 {
-        let [x, y] = [x.rem_euclid(self.size[0] as i64), y.rem_euclid(self.size[1] as i64)];
-        self.values[y as usize * self.size[0] + x as usize]
-    }
-
-    /// The value between pixel centres; `x` and `y` in tile widths.
-    fn between(&self, x: f32, y: f32) -> f32 {
-        let [x, y] = [x * self.size[0] as f32 - 0.5, y * self.size[1] as f32 - 0.5];
-        let [i, j] = [x.floor(), y.floor()];
-        let row = |j: i64| self.at(i as i64, j) + (self.at(i as i64 + 1, j) - self.at(i as i64, j)) * (x - i);
-        row(j as i64) + (row(j as i64 + 1) - row(j as i64)) * (y - j)
-    }
-
+/// What a relief needs besides.
+impl Grey {
     /// The same on a grid of `size`, each value a mean over what it stands for.
     fn resized(&self, size: [usize; 2]) -> Self {
         let taps = [self.size[0].div_ceil(size[0]), self.size[1].div_ceil(size[1])];
@@ -141,7 +108,7 @@ impl Map {
 
 impl Relief {
     /// How much of a texel is filled whose centre is at height `z` and whose indices are `i` and `j`.
-    fn cover(&self, heights: &Map, grid: &Grid, i: usize, j: usize, z: f32) -> f32 {
+    fn cover(&self, heights: &Grey, grid: &Grid, i: usize, j: usize, z: f32) -> f32 {
         // The slope of a smooth cubic, two texels wide, as the edges of `Grid::coverage` are.
         const REACH: i64 = FINER as i64 - 1;
         let weight = |step: i64| 1. - (step as f32 / FINER as f32).powi(2);
