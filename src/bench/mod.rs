@@ -9,7 +9,7 @@ pub mod antialiasing;
 pub mod cache;
 pub mod convergence;
 pub mod environment;
-mod file;
+pub(crate) mod file;
 pub mod fingerprint;
 pub mod gallery;
 pub mod measure;

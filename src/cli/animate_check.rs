@@ -1,19 +1,19 @@
 //! `mesoshell animate-check`: what a shell suffers in each frame of an animation.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::Arc;
 
 use clap::Args;
+use mesoshell::Result;
 use mesoshell::film::FrameRange;
 use mesoshell::frame::{Backdrop, file};
 use mesoshell::gpu::DeviceChoice;
-use mesoshell::instrument::{self, FrameResults, Options, Outcome, Results, page};
+use mesoshell::instrument::{self, FrameResults, Options, Results, page};
 use mesoshell::method::Setup;
 use mesoshell::progress::{Interrupt, Progress};
 use mesoshell::scene::Sequence;
 use mesoshell::value::PictureSize;
-use mesoshell::{Error, Result};
 
 use super::Talk;
 use super::progress::{Line, listen};
@@ -64,7 +64,7 @@ fn check(arguments: &Arguments, progress: &Arc<dyn Progress>, interrupt: &Interr
         file::check_writable(heatmap)?;
     }
     if let Some(folder) = &arguments.output {
-        std::fs::create_dir_all(folder).map_err(|error| unwritable(folder, &error))?;
+        instrument::check_writable(folder)?;
     }
     let mut sequence = Sequence::open(&arguments.scene, &arguments.define)?;
     let device = arguments.device.clone().unwrap_or_default();
@@ -80,22 +80,9 @@ fn check(arguments: &Arguments, progress: &Arc<dyn Progress>, interrupt: &Interr
         file::write(heatmap, &outcome.heatmap, &Backdrop::default())?;
     }
     if let Some(folder) = &arguments.output {
-        write(folder, &outcome)?;
+        instrument::write(folder, &outcome)?;
     }
     Ok(outcome.results)
-}
-
-fn write(folder: &Path, outcome: &Outcome) -> Result<()> {
-    let results = serde_json::to_string_pretty(&outcome.results).expect("numbers and names alone");
-    for (name, text) in [("results.json", results), ("index.html", page::page(outcome))] {
-        let path = folder.join(name);
-        std::fs::write(&path, text).map_err(|error| unwritable(&path, &error))?;
-    }
-    Ok(())
-}
-
-fn unwritable(path: &Path, error: &std::io::Error) -> Error {
-    Error::Output { path: path.to_owned(), message: format!("cannot be written: {error}"), help: None }
 }
 
 /// A table of the frames, what is wrong with them, and what the thickness may be.

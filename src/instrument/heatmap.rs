@@ -22,8 +22,7 @@ const LEAST_RANGE: f64 = 1.01;
 pub fn paint(scene: &Scene, deformations: &[Option<[f64; 3]>], frame: u32) -> Image {
     let View { width, height, .. } = scene.view;
     let values: Vec<Option<f64>> = deformations.chunks(3).map(furthest).collect();
-    let range = values.iter().flatten().map(|value| value.ln().abs()).filter(|ln| ln.is_finite());
-    let range = range.fold(LEAST_RANGE.ln(), f64::max).exp();
+    let range = Range::of(deformations);
 
     let mut picture = Image::new(width, height + LEGEND);
     picture.rgba.fill([1.0; 4]);
@@ -44,7 +43,7 @@ pub fn paint(scene: &Scene, deformations: &[Option<[f64; 3]>], frame: u32) -> Im
         let facing = (b - a).cross(c - a).normalize_or_zero().dot(a.normalize()).abs();
         // So that the shape is seen.
         let shade = (0.45 + 0.55 * facing) as f32;
-        let [r, g, b_] = value.map_or([0.0; 3], |value| colour(value, range)).map(|channel| channel * shade);
+        let [r, g, b_] = value.map_or([0.0; 3], |value| range.colour(value)).map(|channel| channel * shade);
         fill(&mut picture, &mut depths, &scene.view, [a, b, c], [r, g, b_, 1.0]);
     }
     legend(&mut picture, height, range, frame);
@@ -56,14 +55,32 @@ fn furthest(tetrahedra: &[Option<[f64; 3]>]) -> Option<f64> {
     values.max_by(|a, b| a.ln().abs().total_cmp(&b.ln().abs()))
 }
 
-/// Linear RGB.
-fn colour(value: f64, range: f64) -> [f32; 3] {
-    let at = (value.ln() / range.ln()).clamp(-1.0, 1.0) as f32;
-    let [from, to] = [1, if at < 0.0 { 0 } else { 2 }].map(|index: usize| COLOURS[index]);
-    std::array::from_fn(|i| {
-        let encoded = f32::from(from[i]) + at.abs() * (f32::from(to[i]) - f32::from(from[i]));
-        linear_from_srgb(encoded / 255.0)
-    })
+/// The least and the greatest factor, on either side of 1.
+#[derive(Clone, Copy)]
+struct Range {
+    least: f64,
+    greatest: f64,
+}
+
+impl Range {
+    fn of(deformations: &[Option<[f64; 3]>]) -> Self {
+        let all = deformations.iter().flatten().flatten().filter(|value| value.is_normal());
+        let range = Self { least: LEAST_RANGE.recip(), greatest: LEAST_RANGE };
+        all.fold(range, |Self { least, greatest }, &value| Self {
+            least: least.min(value),
+            greatest: greatest.max(value),
+        })
+    }
+
+    /// Linear RGB: each side goes to its own end, by logarithms.
+    fn colour(self, value: f64) -> [f32; 3] {
+        let (end, index) = if value < 1.0 { (self.least, 0) } else { (self.greatest, 2) };
+        let part = (value.ln() / end.ln()).clamp(0.0, 1.0) as f32;
+        std::array::from_fn(|i| {
+            let [from, to] = [1, index].map(|index: usize| f32::from(COLOURS[index][i]));
+            linear_from_srgb((from + part * (to - from)) / 255.0)
+        })
+    }
 }
 
 /// A triangle in the camera's axes, right, down and forward, at pixel centres that are nearer than what is there.
@@ -92,12 +109,13 @@ fn fill(picture: &mut Image, depths: &mut [f64], view: &View, corners: [DVec3; 3
 }
 
 /// A bar of all colours, and the factors at its ends.
-fn legend(picture: &mut Image, top: u32, range: f64, frame: u32) {
+fn legend(picture: &mut Image, top: u32, range: Range, frame: u32) {
     let width = picture.width;
     let (left, right) = (8, width.saturating_sub(8));
     for x in left..right {
         let at = 2.0 * f64::from(x - left) / f64::from((right - left).max(2) - 1) - 1.0;
-        let [r, g, b] = colour((at * range.ln()).exp(), range);
+        let end = if at < 0.0 { range.least } else { range.greatest };
+        let [r, g, b] = range.colour((at.abs() * end.ln()).exp());
         for y in top + 4..top + 16 {
             picture.rgba[(y * width + x) as usize] = [r, g, b, 1.0];
         }
@@ -105,7 +123,7 @@ fn legend(picture: &mut Image, top: u32, range: f64, frame: u32) {
     let letters = Letters::Small;
     let mut write = |text: &str, left: u32| letters.write(picture, text, [left, top + 22], 0.0);
     let wide = |text: &str| letters.side() * text.len() as u32;
-    let (least, greatest) = (format!("{:.3}", range.recip()), format!("{range:.3}"));
+    let (least, greatest) = (format!("{:.3}", range.least), format!("{:.3}", range.greatest));
     write(&least, left);
     write(&greatest, right.saturating_sub(wide(&greatest)));
     let middle = format!("stretch in frame {frame}");
@@ -123,6 +141,19 @@ mod tests {
 
     fn reddest(picture: &Image) -> f32 {
         picture.rgba.iter().take(128 * 128).map(|[r, _, b, _]| r - b).fold(f32::NEG_INFINITY, f32::max)
+    }
+
+    /// The legend tells the least and the greatest that were measured, not the inverse of the one as the other.
+    #[test]
+    fn each_side_has_its_own_end() {
+        let range = Range::of(&[Some([0.25, 1.0, 1.5]), None, Some([0.9, 1.2, 0.0])]);
+        assert_eq!((range.least, range.greatest), (0.25, 1.5));
+        let encoded = |colour: [u8; 3]| colour.map(|byte| linear_from_srgb(f32::from(byte) / 255.0));
+        for (value, colour) in [(0.25, COLOURS[0]), (1.0, COLOURS[1]), (1.5, COLOURS[2])] {
+            assert_eq!(range.colour(value), encoded(colour), "{value}");
+        }
+        let same = Range::of(&[Some([1.0; 3])]);
+        assert_eq!((same.least, same.greatest), (LEAST_RANGE.recip(), LEAST_RANGE));
     }
 
     #[test]

@@ -16,6 +16,7 @@ pub mod results;
 pub mod stretch;
 pub mod walk;
 
+pub use page::{check_writable, write};
 pub use results::{FrameResults, Results};
 pub use walk::{Options, Outcome, walk};
 

@@ -1,17 +1,44 @@
 //! The results as one HTML page that needs nothing else.
 
 use std::fmt::Write;
+use std::io::Write as _;
+use std::path::Path;
 
 use super::faults::Places;
 use super::plot::{Curve, svg};
 use super::results::{FrameResults, Results, rounded_down};
 use super::walk::Outcome;
+use crate::Result;
+use crate::bench::file;
 use crate::bench::report::html::{escape, head};
 use crate::bench::report::picture::data_uri;
 use crate::frame::Backdrop;
 
 /// Rows of tetrahedra and pairs that are told.
 const ROWS: usize = 40;
+
+const PAGE: &str = "index.html";
+const RESULTS: &str = "results.json";
+
+/// Whether [`write()`] can write into a folder, which is made where it is missing.
+///
+/// # Errors
+/// [`Error::Output`](crate::Error::Output).
+pub fn check_writable(folder: &Path) -> Result<()> {
+    file::check_writable(&folder.join(PAGE))
+}
+
+/// Writes the page and the results, each whole or not at all.
+///
+/// # Errors
+/// [`Error::Output`](crate::Error::Output).
+pub fn write(folder: &Path, outcome: &Outcome) -> Result<()> {
+    let results = serde_json::to_string_pretty(&outcome.results).expect("numbers and names alone");
+    for (name, text) in [(RESULTS, results), (PAGE, page(outcome))] {
+        file::write_whole(&folder.join(name), |file| file.write_all(text.as_bytes()))?;
+    }
+    Ok(())
+}
 
 /// The page.
 pub fn page(outcome: &Outcome) -> String {
