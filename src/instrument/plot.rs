@@ -52,8 +52,7 @@ pub fn svg(title: &str, frames: &[u32], curves: &[Curve]) -> String {
             digits(step)
         );
     }
-    let every = self::step((last - first) / 8.0).max(1.0);
-    for &frame in frames.iter().filter(|&&frame| f64::from(frame) % every == 0.0 || frame == frames[0]) {
+    for &frame in frames.iter().step_by(frames.len().div_ceil(8)) {
         let _ = writeln!(
             svg,
             "<text class=\"tick\" x=\"{:.1}\" y=\"{}\" text-anchor=\"middle\">{frame}</text>",
