@@ -5,7 +5,8 @@
 
 #include "shell.glsl"
 
-layout(set = 0, binding = 0, std430) readonly buffer Cells { Cell cells[]; }; // front to back
+layout(set = 0, binding = 0, std430) readonly buffer Cells { Cell cells[]; };
+layout(set = 0, binding = 2, std430) readonly buffer List { uint list[]; }; // of cells, front to back
 
 layout(location = 0) flat out vec4 planes[4];
 layout(location = 4) flat out vec4 texture_rows[3];
@@ -16,11 +17,12 @@ layout(location = 7) flat out uint cell_index;
 const uint CORNERS[6] = uint[](0, 1, 2, 0, 2, 3);
 
 void main() {
-    Cell cell = cells[gl_VertexIndex / 6];
+    uint index = list[gl_VertexIndex / 6];
+    Cell cell = cells[index];
     planes = cell.planes;
     texture_rows = cell.texture;
 #ifdef LIT
-    cell_index = gl_VertexIndex / 6;
+    cell_index = index;
 #endif
     uint corner = CORNERS[gl_VertexIndex % 6];
     vec4 pair = cell.outline[corner / 2];

@@ -1,7 +1,7 @@
 // The members of a tile that a ray meets, sorted along it.
 
 layout(set = 0, binding = 0, std430) readonly buffer Cells { Cell cells[]; };
-layout(set = 0, binding = 2, std430) readonly buffer Members { uint list[]; };
+layout(set = 0, binding = 2, std430) readonly buffer List { uint list[]; }; // of cells, by tile
 
 layout(location = 0) flat in uvec2 members; // range of the list of cells: first, end
 

@@ -150,7 +150,7 @@ pub struct Limit {
 }
 
 /// The corners of face `k`, counter-clockwise seen from outside a tetrahedron of positive volume.
-const FACES: [[usize; 3]; 4] = [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]];
+pub(crate) const FACES: [[usize; 3]; 4] = [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]];
 
 impl ShellOptions {
     /// A shell of even thickness (world units) along the mesh's own normals, with its own UVs.

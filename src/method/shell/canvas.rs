@@ -18,7 +18,7 @@ pub(super) struct Canvas {
     cycle: Option<Pipeline>,
     cells: Buffer,
     tiles: Buffer,
-    members: Buffer,
+    list: Buffer,
     /// In a lit scene.
     pub(super) lit: Option<LitView>,
     /// Where there are solids: their picture, and what lays it behind the medium.
@@ -28,7 +28,7 @@ pub(super) struct Canvas {
 impl Canvas {
     /// By the binding that shaders name.
     pub(super) fn buffers<'a>(&'a self, lit: Option<&'a Lit>) -> Vec<(u32, &'a Buffer)> {
-        let mut buffers = vec![(0, &self.cells), (1, &self.tiles), (2, &self.members)];
+        let mut buffers = vec![(0, &self.cells), (1, &self.tiles), (2, &self.list)];
         if let (Some(lit), Some(view)) = (lit, &self.lit) {
             buffers.extend([(3, &view.cells), (4, &lit.frames)]);
             buffers.extend(view.lights());
@@ -75,7 +75,7 @@ impl Shell {
         if !is_uploaded {
             canvas.cells.refill(&seen.cells)?;
             canvas.tiles.refill(&seen.tiles)?;
-            canvas.members.refill(&seen.members)?;
+            canvas.list.refill(&seen.list)?;
         }
         if let (Some(lit), Some(kept), Some(sight)) = (&self.lit, &mut canvas.lit, self.sight(seen, view)) {
             kept.refill(lit, sight, !is_uploaded)?;
@@ -163,9 +163,9 @@ impl Shell {
             kind,
             sorted,
             cycle,
-            cells: Buffer::storage(&self.gpu, "the tetrahedra in order", &seen.cells)?,
+            cells: Buffer::storage(&self.gpu, "the tetrahedra", &seen.cells)?,
             tiles: Buffer::storage(&self.gpu, "the tiles of cycles", &seen.tiles)?,
-            members: Buffer::storage(&self.gpu, "the members of cycles", &seen.members)?,
+            list: Buffer::storage(&self.gpu, "the tetrahedra in order", &seen.list)?,
             lit,
             solids: solids.transpose()?,
             target,

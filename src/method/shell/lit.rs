@@ -69,7 +69,7 @@ pub struct Lit {
 
 /// What depends on it.
 pub struct LitView {
-    /// [`LitCell`]s, one a drawn cell.
+    /// [`LitCell`]s, one a tetrahedron.
     pub cells: Buffer,
     /// [`Lighting`] and its [`LightSource`]s.
     pub lighting: Buffer,
@@ -118,12 +118,11 @@ impl Lit {
     }
 
     fn cells(&self, shell: &Shell, seen: &Seen) -> Vec<LitCell> {
-        let cell = |&t: &u32| {
-            let t = t as usize;
-            let per_height = shell.cells[t].gradients.map(|gradient| (gradient.length() * seen.unit) as f32);
-            LitCell { frames: self.of_vertices[t], per_height }
+        let cell = |(cell, &frames): (&shell::Cell, &[u32; 4])| {
+            let per_height = cell.gradients.map(|gradient| (gradient.length() * seen.unit) as f32);
+            LitCell { frames, per_height }
         };
-        seen.tetrahedra.par_iter().map(cell).collect()
+        shell.cells.par_iter().zip(&self.of_vertices).map(cell).collect()
     }
 }
 

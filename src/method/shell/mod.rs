@@ -133,15 +133,17 @@ impl Method for Shell {
     fn render(&mut self, view: &View) -> Result<Frame> {
         let mut watch = Stopwatch::start();
         self.interrupt.check()?;
-        let last = self.last.take().filter(|last| last.view == *view);
-        let last = last.filter(|last| Arc::ptr_eq(&last.vertices, &self.scene.shell.vertices));
+        let is_same_sight =
+            |last: &Last| last.view == *view && Arc::ptr_eq(&last.vertices, &self.scene.shell.vertices);
         let mut kept = std::mem::take(&mut self.kept);
-        let (sorted, seen) = match last {
-            Some(Last { sorted, seen, .. }) => {
+        let mut spare = None;
+        let (sorted, seen) = match self.last.take() {
+            Some(last) if is_same_sight(&last) => {
                 kept.push("the order is kept: neither the geometry nor the camera has moved".into());
-                (sorted, seen)
+                (last.sorted, last.seen)
             }
-            None => {
+            last => {
+                spare = last.and_then(|last| last.seen);
                 self.progress.stage("sorting the tetrahedra");
                 let sorted = self.sorter.sort(&self.scene.shell, view);
                 watch.lap("order");
@@ -153,13 +155,14 @@ impl Method for Shell {
         };
 
         self.interrupt.check()?;
-        let seen = seen.filter(|(_, shell)| Arc::ptr_eq(shell, &self.scene.shell));
-        let is_uploaded = seen.is_some() && self.canvas.is_some();
+        let is_same_shell = seen.as_ref().is_some_and(|(_, shell)| Arc::ptr_eq(shell, &self.scene.shell));
+        let is_uploaded = is_same_shell && self.canvas.is_some();
         let seen = match seen {
-            Some((seen, _)) => seen,
-            None => {
+            Some((seen, _)) if is_same_shell => seen,
+            seen => {
                 self.progress.stage("mapping the view");
-                let seen = Seen::new(&self.scene, &sorted, view, self.gpu.subpixels());
+                let spare = seen.or(spare).map(|(seen, _)| seen);
+                let seen = Seen::new(&self.scene, &sorted, view, self.gpu.subpixels(), spare);
                 watch.lap("see");
                 seen
             }

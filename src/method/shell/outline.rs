@@ -41,22 +41,28 @@ const SHARPEST: f64 = 0.1;
 const FARTHEST: f64 = 4.0;
 
 impl Projection {
-    fn project(&self, point: DVec3) -> DVec2 {
+    /// Where a point beyond the near plane is seen.
+    pub fn project(&self, point: DVec3) -> DVec2 {
         self.centre + DVec2::new(point.x, -point.y) / (point.z * self.pixel)
     }
 
-    /// The outline of the tetrahedron with these view-space vertices. Bit `k` of `exit_faces` is set where
-    /// the eye lies on the inner side of the face opposite vertex `k`.
+    /// The outline of the tetrahedron with these view-space vertices, given where they [`project`](Self::project) to. Bit `k` of
+    /// `exit_faces` is set where the eye lies on the inner side of the face opposite vertex `k`.
     ///
     /// # Errors
     /// [`Unseen`], where no pixel centre can meet it.
-    pub fn outline(&self, vertices: &[DVec3; 4], exit_faces: u8) -> Result<Outline, Unseen> {
+    pub fn outline(
+        &self,
+        vertices: &[DVec3; 4],
+        pixels: [DVec2; 4],
+        exit_faces: u8,
+    ) -> Result<Outline, Unseen> {
         let mut bounds = Bounds::EMPTY;
         let cut = vertices.iter().any(|vertex| vertex.z <= self.near);
         if cut {
             self.bound_beyond_near(vertices, &mut bounds);
         } else {
-            vertices.iter().for_each(|vertex| bounds.include(self.project(*vertex)));
+            pixels.into_iter().for_each(|pixel| bounds.include(pixel));
         }
         if bounds.is_empty() {
             return Err(Unseen::BeforeNear);
@@ -70,7 +76,7 @@ impl Projection {
         if cut || far {
             return Ok(bounds.clamped(-self.margin, size + self.margin).corners());
         }
-        let corners = hull(vertices.map(|vertex| self.project(vertex)), exit_faces);
+        let corners = hull(pixels, exit_faces);
         Ok(widened(&corners, self.margin).unwrap_or_else(|| rectangle(&corners, self.margin)))
     }
 
@@ -170,10 +176,11 @@ fn widened(corners: &Outline, margin: f64) -> Option<Outline> {
         let normals = (-before.perp(), -after.perp());
         let bisector = normals.0 + normals.1;
         // |bisector| / 2 is the sine of half the corner's angle.
-        if bisector.length() < 2.0 * SHARPEST {
+        let squared = bisector.length_squared();
+        if squared < (2.0 * SHARPEST).powi(2) {
             return None;
         }
-        moved[i] = polygon[i] + bisector * (2.0 * margin / bisector.length_squared());
+        moved[i] = polygon[i] + bisector * (2.0 * margin / squared);
     }
     if count == 3 {
         moved[3] = moved[2];
@@ -206,6 +213,14 @@ mod tests {
 
     const PROJECTION: Projection =
         Projection { centre: DVec2::new(32.0, 24.0), pixel: 1.0 / 32.0, near: 0.125, margin: 1.0 / 128.0 };
+
+    fn outline(
+        projection: Projection,
+        vertices: &[DVec3; 4],
+        exit_faces: u8,
+    ) -> std::result::Result<Outline, Unseen> {
+        projection.outline(vertices, vertices.map(|vertex| projection.project(vertex)), exit_faces)
+    }
 
     /// Exit faces of a tetrahedron seen from the origin.
     fn exit_faces(vertices: &[DVec3; 4]) -> u8 {
@@ -244,7 +259,7 @@ mod tests {
         let mut random = Pcg64::seed_from_u64(6);
         let mut tested = 0;
         for vertices in tetrahedra(20_000) {
-            let outline = PROJECTION.outline(&vertices, exit_faces(&vertices));
+            let outline = outline(PROJECTION, &vertices, exit_faces(&vertices));
             for _ in 0..20 {
                 let weights: [f64; 4] = std::array::from_fn(|_| -random.random_range(1e-9..1.0f64).ln());
                 let sum: f64 = weights.iter().sum();
@@ -278,7 +293,7 @@ mod tests {
             DVec3::new(0.1, 0.1, 2.5),
         ];
         let exact = Projection { margin: 0.0, ..PROJECTION };
-        let outline = exact.outline(&vertices, exit_faces(&vertices)).unwrap();
+        let outline = outline(exact, &vertices, exit_faces(&vertices)).unwrap();
         let corner = exact.project(vertices[0]);
         assert!(covers(&outline, corner + DVec2::new(0.1, -0.1)));
         assert!(!covers(&outline, corner - DVec2::new(PROJECTION.margin / 2.0, 0.0)));
@@ -300,7 +315,7 @@ mod tests {
                 continue;
             }
             let exits = exit_faces(&vertices);
-            let outline = PROJECTION.outline(&vertices, exits).unwrap();
+            let outline = outline(PROJECTION, &vertices, exits).unwrap();
             // A rectangle along the longest diagonal is at most twice the hull, whose area is at least half
             // the diagonal times the rectangle's other side. The margin adds a strip along each edge, and a corner moved by
             // at most ten margins at each end of it.
@@ -317,7 +332,7 @@ mod tests {
     fn what_cannot_be_seen_has_no_outline() {
         let at =
             |centre: DVec3| [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z].map(|corner| centre + 0.1 * corner);
-        assert_eq!(PROJECTION.outline(&at(DVec3::new(0.0, 0.0, -1.0)), 1), Err(Unseen::BeforeNear));
-        assert_eq!(PROJECTION.outline(&at(DVec3::new(9.0, 0.0, 2.0)), 1), Err(Unseen::Beside));
+        assert_eq!(outline(PROJECTION, &at(DVec3::new(0.0, 0.0, -1.0)), 1), Err(Unseen::BeforeNear));
+        assert_eq!(outline(PROJECTION, &at(DVec3::new(9.0, 0.0, 2.0)), 1), Err(Unseen::Beside));
     }
 }

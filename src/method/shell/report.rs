@@ -15,7 +15,7 @@ impl Shell {
             Report { method: "shell".into(), device: self.gpu.info().name.clone(), ..Report::default() };
         let mut count = |name: &str, value: u64| report.counts.insert(name.to_owned(), value);
         count("tetrahedra", health.tetrahedra);
-        count("tetrahedra_drawn", seen.cells.len() as u64);
+        count("tetrahedra_drawn", seen.count);
         count("face_relations", sorted.face_relations);
         count("image_relations", sorted.image_relations);
         count("cycles", sorted.order.cycles.len() as u64);

@@ -10,8 +10,9 @@ use glam::{DMat3, DVec2, DVec3};
 use rayon::prelude::*;
 
 use super::outline::{Projection, Unseen};
-use crate::order::Sorted;
+use crate::order::{Order, Sorted};
 use crate::scene::{Scene, View};
+use crate::shell::{Cell as Maps, FACES};
 
 /// `Cell` of `glsl/include/shell.glsl`: see there for each member.
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
@@ -37,23 +38,24 @@ pub struct Tile {
 /// The side of a [`Tile`] in pixels: small enough that few members of a large cycle reach into one.
 const TILE: u32 = 16;
 
-/// A cell as it is seen.
-struct Mapped {
-    tetrahedron: u32,
-    cell: Cell,
-    /// The least depth of a vertex, in world units.
-    nearest: f64,
-    /// Whether more than level 0 can be needed in it.
-    minified: bool,
-}
+/// Tetrahedra that one task of the thread pool takes at least: some 0.1 ms of work.
+const TASK: usize = 512;
 
-/// `None` where there is no volume.
-type Found = Option<Result<Mapped, Unseen>>;
+/// Whether a tetrahedron is seen, and why not.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Found {
+    /// Whether more than level 0 can be needed in it.
+    Seen {
+        minified: bool,
+    },
+    WithoutVolume,
+    Unseen(Unseen),
+}
 
 /// What is drawn together.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Run {
-    /// These cells, one after another.
+    /// The cells of this part of [`Seen::list`], one after another.
     Sorted(Range<u32>),
     /// These tiles, each resolved per pixel among its members.
     Cycle(Range<u32>),
@@ -62,16 +64,16 @@ pub enum Run {
 /// All that can be seen, and what cannot.
 #[derive(Debug, Clone, Default)]
 pub struct Seen {
-    /// Front to back.
+    /// One a tetrahedron; of those that are not in `list`, anything.
     pub cells: Vec<Cell>,
-    /// That of each cell, in the shell.
-    pub tetrahedra: Vec<u32>,
+    /// Tetrahedra, by run, front to back; those of a cycle by tile, nearest first.
+    pub list: Vec<u32>,
     /// Where cells meet that have no order of their own.
     pub tiles: Vec<Tile>,
-    /// Cells, by tile.
-    pub members: Vec<u32>,
-    /// Front to back; every cell is in one.
+    /// Front to back; every tetrahedron that is seen is in one.
     pub runs: Vec<Run>,
+    /// Tetrahedra that can be seen.
+    pub count: u64,
     /// Tetrahedra before the near plane.
     pub before_near: u64,
     /// Tetrahedra beside the picture.
@@ -83,54 +85,58 @@ pub struct Seen {
 }
 
 impl Seen {
-    /// Maps the tetrahedra of `scene` in the order `sorted` to `view`, on a rasteriser that snaps to `subpixels`
-    /// a pixel.
-    pub fn new(scene: &Scene, sorted: &Sorted, view: &View, subpixels: u32) -> Self {
+    /// Maps the tetrahedra of `scene` to `view`, and lists them in the order `sorted`, for a rasteriser that snaps to `subpixels`
+    /// a pixel. `spare`, which is no longer needed, may lend its memory.
+    pub fn new(scene: &Scene, sorted: &Sorted, view: &View, subpixels: u32, spare: Option<Self>) -> Self {
         let eye = Eye::new(scene, view, subpixels);
-        let order = &sorted.order;
-        let found: Vec<Found> = order
-            .sequence
-            .par_iter()
-            .map(|&t| {
-                let (t, exit_faces) = (t as usize, sorted.exit_faces[t as usize]);
-                let has_volume = exit_faces != 0 && scene.shell.cells[t].has_maps();
-                has_volume.then(|| eye.cell(t, exit_faces))
-            })
-            .collect();
-        let mut seen = Self { cells: Vec::with_capacity(found.len()), unit: eye.unit, ..Self::default() };
+        let mut seen = Self { unit: eye.unit, ..Self::default() };
+        if let Some(spare) = spare {
+            (seen.cells, seen.list) = (spare.cells, spare.list);
+            seen.list.clear();
+        }
+        // In the order of the tetrahedra, since that is how all that is read and written here lies in memory.
+        seen.cells.resize(scene.shell.cells.len(), Cell::zeroed());
+        let cells = seen.cells.par_iter_mut().zip(&sorted.exit_faces).enumerate().with_min_len(TASK);
+        let mut found = Vec::new();
+        cells.map(|(t, (cell, &exit_faces))| eye.map(t, exit_faces, cell)).collect_into_vec(&mut found);
+
+        let Order { sequence, cycles } = &sorted.order;
         let mut done = 0;
-        for cycle in &order.cycles {
-            seen.add_sorted(&found[done..cycle.start]);
-            seen.add_cycle(&found[cycle.clone()], view);
+        for cycle in cycles {
+            seen.add_sorted(&sequence[done..cycle.start], &found);
+            seen.add_cycle(&sequence[cycle.clone()], &found, &eye, view);
             done = cycle.end;
         }
-        seen.add_sorted(&found[done..]);
+        seen.add_sorted(&sequence[done..], &found);
         seen
     }
 
-    fn add_sorted(&mut self, found: &[Found]) {
-        let added = self.add(found.iter().flatten());
+    fn add_sorted(&mut self, tetrahedra: &[u32], found: &[Found]) {
+        let first = self.list.len() as u32;
+        for &t in tetrahedra {
+            if self.count(found[t as usize]) {
+                self.list.push(t);
+            }
+        }
+        let added = first..self.list.len() as u32;
         if !added.is_empty() {
             self.runs.push(Run::Sorted(added));
         }
     }
 
-    fn add_cycle(&mut self, found: &[Found], view: &View) {
-        // No order is right, but members that come about nearest first are sorted quickly in every pixel.
-        let mut found: Vec<_> = found.iter().flatten().collect();
-        found.sort_by(|a, b| {
-            let [a, b] = [a, b].map(|found| found.as_ref().map_or(0.0, |mapped| mapped.nearest));
-            a.total_cmp(&b)
-        });
-        let added = self.add(found);
-        if added.is_empty() {
+    fn add_cycle(&mut self, tetrahedra: &[u32], found: &[Found], eye: &Eye<'_>, view: &View) {
+        let mut cells: Vec<u32> = tetrahedra.to_vec();
+        cells.retain(|&t| self.count(found[t as usize]));
+        if cells.is_empty() {
             return;
         }
+        // No order is right, but members that come about nearest first are sorted quickly in every pixel.
+        cells.sort_by(|&a, &b| eye.nearest(a as usize).total_cmp(&eye.nearest(b as usize)));
         let first_tile = self.tiles.len() as u32;
         let columns = view.width.div_ceil(TILE);
         let size = [f64::from(view.width), f64::from(view.height)];
-        let mut inside: Vec<(u32, u32)> = Vec::new(); // tile, cell
-        for cell in added {
+        let mut inside: Vec<(u32, usize)> = Vec::new(); // tile, place in `cells`
+        for (place, &cell) in cells.iter().enumerate() {
             let corners =
                 || self.cells[cell as usize].outline.into_iter().flat_map(|[x, y, z, w]| [[x, y], [z, w]]);
             let [across, down] = [0, 1].map(|axis| {
@@ -141,22 +147,37 @@ impl Seen {
                 let tile = |pixel: f64| pixel.clamp(0.0, size[axis] - 1.0) as u32 / TILE;
                 tile(low - 1.0)..=tile(high + 1.0)
             });
-            inside.extend(down.flat_map(|y| across.clone().map(move |x| (y * columns + x, cell))));
+            inside.extend(down.flat_map(|y| across.clone().map(move |x| (y * columns + x, place))));
         }
         inside.sort_unstable();
         for tile in inside.chunk_by(|a, b| a.0 == b.0) {
-            let first = self.members.len() as u32;
-            self.members.extend(tile.iter().map(|(_, cell)| cell));
+            let first = self.list.len() as u32;
+            self.list.extend(tile.iter().map(|&(_, place)| cells[place]));
             let [x, y] = [tile[0].0 % columns * TILE, tile[0].0 / columns * TILE];
             let clip = |pixel: u32, axis: usize| (2.0 * f64::from(pixel) / size[axis] - 1.0) as f32;
             self.tiles.push(Tile {
                 bounds: [clip(x, 0), clip(y, 1), clip(x + TILE, 0), clip(y + TILE, 1)],
-                members: [first, self.members.len() as u32],
+                members: [first, self.list.len() as u32],
                 picture: 0,
                 padding: 0,
             });
         }
         self.runs.push(Run::Cycle(first_tile..self.tiles.len() as u32));
+    }
+
+    /// Whether a tetrahedron is seen; counts it.
+    fn count(&mut self, found: Found) -> bool {
+        match found {
+            Found::Seen { minified } => {
+                self.count += 1;
+                self.minified |= minified;
+                return true;
+            }
+            Found::WithoutVolume => {}
+            Found::Unseen(Unseen::BeforeNear) => self.before_near += 1,
+            Found::Unseen(Unseen::Beside) => self.beside += 1,
+        }
+        false
     }
 
     /// Whether a pixel lies in a tile.
@@ -174,34 +195,27 @@ impl Seen {
         let tiles: HashSet<u32> = self.tiles.iter().map(place).collect();
         move |x, y| tiles.contains(&(y / TILE * columns + x / TILE))
     }
-
-    /// Keeps those that can be seen, counts the others.
-    fn add<'a>(&mut self, found: impl IntoIterator<Item = &'a Result<Mapped, Unseen>>) -> Range<u32> {
-        let first = self.cells.len() as u32;
-        for found in found {
-            match found {
-                Ok(mapped) => {
-                    self.minified |= mapped.minified;
-                    self.cells.push(mapped.cell);
-                    self.tetrahedra.push(mapped.tetrahedron);
-                }
-                Err(Unseen::BeforeNear) => self.before_near += 1,
-                Err(Unseen::Beside) => self.beside += 1,
-            }
-        }
-        first..self.cells.len() as u32
-    }
 }
 
 /// The eye, with all that maps to its picture.
 struct Eye<'a> {
     scene: &'a Scene,
-    position: DVec3,
     /// Rows: right, up, forward.
     view_from_world: DMat3,
     projection: Projection,
     /// See [`Seen::unit`].
     unit: f64,
+    /// The shell's, in view space.
+    vertices: Vec<Vertex>,
+}
+
+/// A vertex as the eye sees it.
+#[derive(Clone, Copy)]
+struct Vertex {
+    /// In view space, world units.
+    position: DVec3,
+    /// Where it is projected, if it lies beyond the near plane.
+    pixel: DVec2,
 }
 
 impl<'a> Eye<'a> {
@@ -215,44 +229,71 @@ impl<'a> Eye<'a> {
             // are off by less than another half up to pictures of 2^13 pixels.
             margin: 2.0 / f64::from(subpixels),
         };
-        let distances = scene.shell.vertices.iter().map(|vertex| vertex.distance_squared(view.camera.eye));
+        let eye = view.camera.eye;
+        let view_from_world = DMat3::from_cols(frame.right, frame.up, frame.forward).transpose();
+        let vertex = |&vertex: &DVec3| {
+            let position = view_from_world * (vertex - eye);
+            Vertex { position, pixel: projection.project(position) }
+        };
+        let distances = scene.shell.vertices.iter().map(|vertex| vertex.distance_squared(eye));
         Self {
             scene,
             unit: distances.fold(view.camera.near.powi(2), f64::max).sqrt(),
-            position: view.camera.eye,
-            view_from_world: DMat3::from_cols(frame.right, frame.up, frame.forward).transpose(),
+            view_from_world,
             projection,
+            vertices: scene.shell.vertices.par_iter().with_min_len(TASK).map(vertex).collect(),
         }
     }
 
-    fn cell(&self, t: usize, exit_faces: u8) -> Result<Mapped, Unseen> {
+    fn vertices(&self, t: usize) -> [Vertex; 4] {
+        self.scene.shell.topology.tetrahedra[t].map(|id| self.vertices[id as usize])
+    }
+
+    /// The least depth of a vertex, in world units.
+    fn nearest(&self, t: usize) -> f64 {
+        self.vertices(t).map(|vertex| vertex.position.z).into_iter().fold(f64::INFINITY, f64::min)
+    }
+
+    /// Fills in the cell of a tetrahedron, where it is seen.
+    fn map(&self, t: usize, exit_faces: u8, cell: &mut Cell) -> Found {
         let shell = &self.scene.shell;
-        let vertices = shell.vertices_of(t).map(|vertex| self.view_from_world * (vertex - self.position));
-        let outline = self.projection.outline(&vertices, exit_faces)?;
+        let Maps { gradients, texture_from_world } = &shell.cells[t];
+        if exit_faces == 0 || !shell.cells[t].has_maps() {
+            return Found::WithoutVolume;
+        }
+        let vertices = self.vertices(t);
+        let positions = vertices.map(|vertex| vertex.position);
+        let pixels = vertices.map(|vertex| vertex.pixel);
+        let outline = match self.projection.outline(&positions, pixels, exit_faces) {
+            Ok(outline) => outline,
+            Err(unseen) => return Found::Unseen(unseen),
+        };
         let clip = |corner: DVec2| (corner - self.projection.centre) / self.projection.centre;
         let [a, b, c, d] = outline.map(|corner| clip(corner).as_vec2());
+        cell.outline = [[a.x, a.y, b.x, b.y], [c.x, c.y, d.x, d.y]];
 
-        let planes = shell.planes(t);
-        let planes = std::array::from_fn(|k| {
-            // From a vertex of the face that both its cells choose: planes of a shared face are equal up to their sign.
-            let on_face = shell.vertices[shell.face(t, k)[0] as usize] - self.position;
-            let normal = planes[k].truncate();
-            (self.view_from_world * normal).as_vec3().extend((normal.dot(on_face) / self.unit) as f32).into()
+        let per_unit = self.unit.recip();
+        cell.planes = std::array::from_fn(|k| {
+            // Both cells at a face go round it from the same corner, one of them the other way: their planes are equal up to the
+            // sign.
+            let [p, q, r] = FACES[k].map(|corner| positions[corner]);
+            let area = (q - p).cross(r - p);
+            let inward = area.dot(self.view_from_world * gradients[k]);
+            let normal = area * (area.length_squared().sqrt().recip().copysign(inward));
+            normal.as_vec3().extend((normal.dot(p) * per_unit) as f32).into()
         });
-        let texture_from_view = shell.cells[t].texture_from_world * self.view_from_world.transpose();
-        let texture_at_eye = shell.texture[t][0] - texture_from_view * vertices[0];
-        let texture = std::array::from_fn(|i| {
-            (texture_from_view.row(i) * self.unit).as_vec3().extend(texture_at_eye[i] as f32).into()
+        let texture_from_view = *texture_from_world * self.view_from_world.transpose();
+        let texture_at_eye = shell.texture[t][0] - texture_from_view * positions[0];
+        let rows = texture_from_view.transpose().to_cols_array_2d().map(DVec3::from);
+        cell.texture = std::array::from_fn(|i| {
+            (rows[i] * self.unit).as_vec3().extend(texture_at_eye[i] as f32).into()
         });
-        let cell = Cell { outline: [[a.x, a.y, b.x, b.y], [c.x, c.y, d.x, d.y]], planes, texture };
-        let depths = vertices.map(|vertex| vertex.z);
-        let nearest = depths.into_iter().fold(f64::INFINITY, f64::min);
-        let farthest = depths.into_iter().fold(f64::NEG_INFINITY, f64::max);
+        let farthest = positions.map(|position| position.z).into_iter().fold(f64::NEG_INFINITY, f64::max);
         // Of all directions, so at least that across the ray.
         let size = self.scene.volume.levels[0].size;
         let texels_per_unit =
-            (0..3).map(|i| f64::from(size[i]) * texture_from_view.row(i).length()).fold(0.0, f64::max);
+            (0..3).map(|i| rows[i].length_squared() * f64::from(size[i]).powi(2)).fold(0.0, f64::max).sqrt();
         let footprint = self.scene.medium.lod_footprint * self.projection.pixel * farthest;
-        Ok(Mapped { tetrahedron: t as u32, cell, nearest, minified: footprint * texels_per_unit > 1.0 })
+        Found::Seen { minified: footprint * texels_per_unit > 1.0 }
     }
 }
