@@ -189,7 +189,8 @@ fn by_centroid(shell: &Shell, view: &View) -> Order {
 
 /// The order by relations between neighbours alone.
 fn by_faces(shell: &Shell, view: &View) -> Order {
-    let relations = FaceTable::new(&shell.topology).relate(&shell.topology, &shell.vertices, view.camera.eye);
+    let relations =
+        FaceTable::new(&shell.topology).relate(&shell.determinants, &shell.vertices, view.camera.eye);
     let in_front = InFront::new(shell.topology.tetrahedra.len(), &[&relations.pairs]);
     let (sequence, cycles) = in_front.components();
     Order { sequence, cycles }

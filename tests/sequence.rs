@@ -92,7 +92,7 @@ fn differences(a: &Scene, b: &Scene) -> Vec<&'static str> {
     let parts = [
         ("topology", a.shell.topology == b.shell.topology),
         ("vertices", a.shell.vertices == b.shell.vertices),
-        ("texture", a.shell.texture == b.shell.texture && a.shell.cells == b.shell.cells),
+        ("texture", a.shell.texture == b.shell.texture && a.shell.cells() == b.shell.cells()),
         ("volume", a.volume == b.volume),
         ("shading", a.shading == b.shading),
         ("solids", a.solids == b.solids),

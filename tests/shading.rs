@@ -5,7 +5,7 @@ mod common;
 
 use std::f64::consts::PI;
 use std::path::Path;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use common::Watched;
 use glam::{DMat3, DQuat, DVec2, DVec3};
@@ -379,12 +379,9 @@ fn a_mirrored_world_looks_mirrored() {
             topology.tetrahedra[t].swap(2, 3);
             topology.neighbours[t].swap(2, 3);
             topology.corners[t].swap(2, 3);
-            shell_of.texture[t].swap(2, 3);
-            let cell = &mut shell_of.cells[t];
-            cell.gradients = cell.gradients.map(flip);
-            cell.gradients.swap(2, 3);
-            cell.texture_from_world.x_axis = -cell.texture_from_world.x_axis;
+            Arc::make_mut(&mut shell_of.texture)[t].swap(2, 3);
         }
+        shell_of.maps = OnceLock::new();
         shell_of.topology = Arc::new(topology);
         for vector in [&mut mirrored.view.camera.eye, &mut mirrored.view.camera.target] {
             *vector = flip(*vector);

@@ -69,7 +69,7 @@ fn strip(moves: &[[f64; 3]], stretch: [f64; 3]) -> Option<Shell> {
         let [a, b, c, d] = shell.vertices_of(t);
         (b - a).cross(c - a).dot(d - a)
     };
-    (0..shell.cells.len()).all(|t| volume(t) * volume(0) > 0.0).then_some(shell)
+    (0..shell.topology.tetrahedra.len()).all(|t| volume(t) * volume(0) > 0.0).then_some(shell)
 }
 
 /// The length of a ray inside the strip from its outer faces alone, by the signed depths at which it crosses them (Möller and
@@ -77,7 +77,7 @@ fn strip(moves: &[[f64; 3]], stretch: [f64; 3]) -> Option<Shell> {
 fn length_by_outer_faces(shell: &Shell, view: &View, point: DVec2) -> f64 {
     let (eye, direction) = (view.camera.eye, view.ray_at_unit_depth(point));
     let mut length = 0.0;
-    for t in 0..shell.cells.len() {
+    for t in 0..shell.topology.tetrahedra.len() {
         for k in 0..4 {
             if shell.topology.neighbours[t][k] != EXTERIOR {
                 continue;
@@ -93,7 +93,7 @@ fn length_by_outer_faces(shell: &Shell, view: &View, point: DVec2) -> f64 {
                 continue;
             }
             let depth = ac.dot(from.cross(ab)) / determinant;
-            let leaves = shell.cells[t].gradients[k].dot(direction) < 0.0;
+            let leaves = shell.cells()[t].gradients[k].dot(direction) < 0.0;
             length += if leaves { depth } else { -depth };
         }
     }
@@ -150,7 +150,8 @@ proptest! {
 #[test]
 fn a_strip_with_a_gap_would_be_seen() {
     let shell = strip(&[[0.0; 3]; 8], [1.0; 3]).unwrap();
-    let mut corners: Vec<[DVec3; 4]> = (0..shell.cells.len()).map(|t| shell.vertices_of(t)).collect();
+    let mut corners: Vec<[DVec3; 4]> =
+        (0..shell.topology.tetrahedra.len()).map(|t| shell.vertices_of(t)).collect();
     let scene = seen(shell, DVec3::new(4.0, 1.0, 3.0), 48);
     // One tetrahedron a little smaller at one of its inner faces than its neighbour thinks.
     let [_, from, _, to] = corners[2];

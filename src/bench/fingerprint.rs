@@ -62,10 +62,8 @@ fn seen(mut builder: Builder, scene: &Scene, view: &View, levels: &[Volume]) -> 
         .numbers(&[*width, *height])
         .numbers(&scene.shell.topology.tetrahedra)
         .numbers(scene.shell.vertices.as_slice())
-        .numbers(&scene.shell.texture);
-    for cell in &scene.shell.cells {
-        builder = builder.numbers(&cell.gradients).numbers(&[cell.texture_from_world]);
-    }
+        .numbers(scene.shell.texture.as_slice())
+        .numbers(&scene.shell.determinants);
     for level in levels {
         let quantity = match level.quantity {
             Quantity::Opacity => "opacity",
@@ -172,8 +170,8 @@ pub(crate) mod tests {
             let vertex = &mut Arc::make_mut(&mut shell(scene).vertices)[3];
             vertex.y = vertex.y.next_up();
         }),
-        ("a texture coordinate", |scene| shell(scene).texture[7][2].z += 1e-15),
-        ("a cell", |scene| shell(scene).cells[5].texture_from_world.x_axis.x += 1e-9),
+        ("a texture coordinate", |scene| Arc::make_mut(&mut shell(scene).texture)[7][2].z += 1e-15),
+        ("a volume", |scene| shell(scene).determinants[5] *= 1.0 + 1e-9),
         ("a texel of the first level", |scene| volume(scene).levels[0].texels[6][1] += 1e-6),
         ("a texel of the last level", |scene| volume(scene).levels[1].texels[0][3] += 1e-6),
         ("the shape of a level", |scene| volume(scene).levels[0].size = [1, 2, 4]),

@@ -85,6 +85,7 @@ pub fn run() -> ExitCode {
     miette::set_hook(Box::new(handler)).expect("no other hook has been set");
 
     let Cli { talk, command } = Cli::parse();
+    start_threads();
     let done = match command {
         Command::Render(arguments) => render::run(arguments, talk),
         Command::Devices(arguments) => devices::run(arguments, talk).map(|()| ExitCode::SUCCESS),
@@ -112,4 +113,18 @@ fn table<'a>(rows: impl IntoIterator<Item = (&'a str, String)>) -> String {
     let width = rows.iter().map(|(name, _)| name.len()).max().unwrap_or(0);
     let lines = rows.iter().map(|(name, value)| format!("  {name:width$}  {value}\n"));
     lines.collect()
+}
+
+/// Starts the pool of threads for all parallel work, a core for each. Left to themselves they may wake, after each pause, on the core
+/// that has just fallen asleep for them, and take turns on it while the other stands idle: CPU stages then take twice as long.
+fn start_threads() {
+    let cores = core_affinity::get_core_ids().unwrap_or_default();
+    let asked = std::env::var_os("RAYON_NUM_THREADS").is_some();
+    let mut pool = rayon::ThreadPoolBuilder::new();
+    if !asked && !cores.is_empty() {
+        pool = pool.num_threads(cores.len()).start_handler(move |thread| {
+            core_affinity::set_for_current(cores[thread]);
+        });
+    }
+    pool.build_global().expect("no pool has been made yet");
 }

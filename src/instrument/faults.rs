@@ -76,7 +76,7 @@ enum Kind {
 /// The faults of a shell as it stands.
 pub fn faults(shell: &Shell) -> Faults {
     let kind = |t: usize| {
-        if !shell.cells[t].has_maps() {
+        if !shell.has_maps(t) {
             return Kind::Flat;
         }
         match (shell.determinant(t) < 0.0, shell.quality(t) < SLIVER_QUALITY) {
@@ -86,7 +86,7 @@ pub fn faults(shell: &Shell) -> Faults {
             (true, true) => Kind::Both,
         }
     };
-    let kinds: Vec<Kind> = (0..shell.cells.len()).into_par_iter().map(kind).collect();
+    let kinds: Vec<Kind> = (0..shell.topology.tetrahedra.len()).into_par_iter().map(kind).collect();
     let of = |of: &[Kind]| (0..).zip(&kinds).filter(|(_, kind)| of.contains(kind)).map(|(t, _)| t).collect();
     let [inverted, slivers]: [Vec<u32>; 2] =
         [&[Kind::Inverted, Kind::Both], &[Kind::Sliver, Kind::Both]].map(|k| of(k));
@@ -118,8 +118,10 @@ mod tests {
         let pushed = 2.0 * shell.vertices[base] - shell.vertices[outer];
         Arc::make_mut(&mut shell.vertices)[outer] = pushed;
         let found = faults(&shell).inverted;
-        let expected: Vec<u32> =
-            (0..).take(shell.cells.len()).filter(|&t| shell.determinant(t as usize) < 0.0).collect();
+        let expected: Vec<u32> = (0..)
+            .take(shell.topology.tetrahedra.len())
+            .filter(|&t| shell.determinant(t as usize) < 0.0)
+            .collect();
         assert!(!expected.is_empty() && expected.len() <= LISTED);
         assert_eq!(found.first.iter().map(|place| place.tetrahedron).collect::<Vec<_>>(), expected);
         assert!(expected.iter().all(|&t| shell.topology.tetrahedra[t as usize].contains(&(outer as u32))));

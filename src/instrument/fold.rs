@@ -56,7 +56,8 @@ enum Growth {
 
 /// The factor of a shell as it stands.
 pub fn fold(shell: &Shell) -> Fold {
-    let growths: Vec<Growth> = (0..shell.cells.len()).into_par_iter().map(|t| growth(shell, t)).collect();
+    let growths: Vec<Growth> =
+        (0..shell.topology.tetrahedra.len()).into_par_iter().map(|t| growth(shell, t)).collect();
     let flipped = growths.iter().filter(|growth| **growth == Growth::Flipped).count() as u64;
     let upright = (0..).zip(&growths).filter_map(|(t, growth)| match growth {
         Growth::Upright(until) => Some((t, *until)),
@@ -89,7 +90,7 @@ fn vertex_at(shell: &Shell, factor: f64, id: u32) -> DVec3 {
 
 /// Whether none of those that grow upright is inverted or flat, by exact signs.
 fn is_upright(shell: &Shell, growths: &[Growth], factor: f64) -> bool {
-    (0..shell.cells.len()).into_par_iter().all(|t| {
+    (0..shell.topology.tetrahedra.len()).into_par_iter().all(|t| {
         let corners = shell.topology.tetrahedra[t].map(|id| vertex_at(shell, factor, id));
         growths[t] == Growth::Flat || crate::shell::determinant(corners) > 0.0
     })
@@ -163,7 +164,7 @@ mod tests {
     fn what_points_inward_is_flipped_and_what_never_folds_has_no_factor() {
         let inward = torus_with(0.1, |normal| -normal);
         let found = fold(&inward);
-        assert_eq!((found.factor, found.flipped), (Some(0.0), inward.cells.len() as u64));
+        assert_eq!((found.factor, found.flipped), (Some(0.0), inward.topology.tetrahedra.len() as u64));
         let flat = Shell::build(&crate::mesh::Mesh::triangle(), &crate::shell::ShellOptions::new(1.0));
         assert_eq!(fold(&flat.unwrap()).factor, None);
     }

@@ -66,7 +66,7 @@ pub(super) fn motions(before: Seen<'_>, now: Seen<'_>, grid @ [columns, rows]: [
     let start = |tile: usize| if hides(tile) { Motion::NONE } else { Motion::REST };
     let mut motions: Vec<Motion> = (0..columns * rows).map(start).collect();
     let stands_still = Arc::ptr_eq(before.shell, now.shell) && before.view == now.view;
-    let count = if stands_still { 0 } else { now.shell.cells.len() };
+    let count = if stands_still { 0 } else { now.shell.topology.tetrahedra.len() };
     let eyes = seen.map(|seen| Eye::of(seen.view));
     let thickness = seen.map(|seen| thickness(seen.shell).greatest);
     let paths =

@@ -92,7 +92,8 @@ pub fn overlaps(shell: &Shell) -> Overlaps {
             node: 0,
         }
     };
-    let with_volume = (0..shell.cells.len()).into_par_iter().filter(|&t| shell.determinant(t) != 0.0);
+    let with_volume =
+        (0..shell.topology.tetrahedra.len()).into_par_iter().filter(|&t| shell.determinant(t) != 0.0);
     let mut solids: Vec<Solid> = with_volume.map(solid).collect();
     if solids.is_empty() {
         return Overlaps::default();
@@ -274,7 +275,7 @@ mod tests {
         assert_eq!(overlaps(&shell), Overlaps::default());
         // The outer vertex over one side of the ring goes to the middle of a tetrahedron on the other.
         let mut planted = shell.clone();
-        let target = shell.cells.len() as u32 / 2;
+        let target = shell.topology.tetrahedra.len() as u32 / 2;
         let outer = shell.topology.base_vertices as usize;
         Arc::make_mut(&mut planted.vertices)[outer] = centroid(&shell, target);
         let found = overlaps(&planted);
@@ -290,7 +291,7 @@ mod tests {
     }
 
     fn overlapping_by_force(shell: &Shell) -> Vec<[u32; 2]> {
-        let count = shell.cells.len();
+        let count = shell.topology.tetrahedra.len();
         let pairs = (0..count).flat_map(|a| (a + 1..count).map(move |b| [a, b]));
         let meeting =
             pairs.filter(|&[a, b]| shared_volume(shell.vertices_of(a), shell.vertices_of(b)) > 1e-12);

@@ -247,13 +247,15 @@ mod tests {
     fn a_texture_that_slides_moves() {
         let before = Arc::new(torus(0.1));
         let mut slid = (*before).clone();
-        for corners in &mut slid.texture {
+        for corners in Arc::make_mut(&mut slid.texture) {
             *corners = corners.map(|t| t + DVec3::new(1.0 / 32.0, 0.0, 0.0));
         }
         // Half the 16th part of a turn, whose chord along the inner equator is 2 (0.75) sin(pi / 16).
         let chord = 0.75 * (std::f64::consts::PI / 16.0).sin();
-        let lengths: Vec<f64> =
-            (0..slid.cells.len()).flat_map(|t| motion::slid(&before, &slid, t)).map(DVec3::length).collect();
+        let lengths: Vec<f64> = (0..slid.topology.tetrahedra.len())
+            .flat_map(|t| motion::slid(&before, &slid, t))
+            .map(DVec3::length)
+            .collect();
         assert!(lengths.iter().any(|length| (length - chord).abs() < 1e-9), "{chord} {:?}", &lengths[..12]);
         assert!(lengths.iter().all(|&length| length > 0.0 && length < 3.0 * chord));
     }

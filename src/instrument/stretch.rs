@@ -44,7 +44,10 @@ pub struct Stretch {
 /// The singular values of the deformation gradient of each tetrahedron, descending; `None` where there is no such gradient.
 /// The shells have one topology.
 pub fn deformations(rest: &Shell, now: &Shell) -> Vec<Option<[f64; 3]>> {
-    (0..rest.cells.len()).into_par_iter().map(|t| gradient(rest, now, t).map(singular_values)).collect()
+    (0..rest.topology.tetrahedra.len())
+        .into_par_iter()
+        .map(|t| gradient(rest, now, t).map(singular_values))
+        .collect()
 }
 
 impl Stretch {
@@ -98,7 +101,7 @@ fn shear([first, _, last]: [f64; 3]) -> f64 {
 }
 
 fn gradient(rest: &Shell, now: &Shell, t: usize) -> Option<DMat3> {
-    if !rest.cells[t].has_maps() {
+    if !rest.has_maps(t) {
         return None;
     }
     let edges = edges(now.vertices_of(t));
@@ -106,11 +109,11 @@ fn gradient(rest: &Shell, now: &Shell, t: usize) -> Option<DMat3> {
     // Coordinates are told to some 1e-16 of their size, which is that of the texture's whole turns.
     let size = 1.0 + after.to_cols_array().into_iter().map(f64::abs).fold(0.0, f64::max);
     let barycentric_from_world =
-        DMat3::from_cols_array_2d(&[1, 2, 3].map(|k| rest.cells[t].gradients[k].to_array()));
+        DMat3::from_cols_array_2d(&[1, 2, 3].map(|k| rest.cells()[t].gradients[k].to_array()));
     let material = if before.abs_diff_eq(after, 1e-12 * size) {
         barycentric_from_world.transpose()
     } else {
-        after.inverse() * rest.cells[t].texture_from_world
+        after.inverse() * rest.cells()[t].texture_from_world
     };
     let gradient = edges * material;
     gradient.is_finite().then_some(gradient)
@@ -215,13 +218,13 @@ mod tests {
     fn a_texture_drawn_out_is_a_stretch_and_one_that_slides_is_none() {
         let rest = torus(0.1);
         let mut now = rest.clone();
-        for corners in &mut now.texture {
+        for corners in Arc::make_mut(&mut now.texture) {
             *corners = corners.map(|t| t * DVec3::new(0.5, 1.0, 1.0) + DVec3::new(0.2, 0.1, 0.0));
         }
         let stretch = of(&rest, &now);
         assert!(stretch.greatest >= 2.0 - 1e-9, "half the texture on the same surface: {stretch:?}");
         let mut now = rest.clone();
-        for corners in &mut now.texture {
+        for corners in Arc::make_mut(&mut now.texture) {
             *corners = corners.map(|t| t + DVec3::new(0.25, 0.1, 0.0));
         }
         let stretch = of(&rest, &now);

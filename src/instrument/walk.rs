@@ -107,7 +107,7 @@ pub fn walk(sequence: &mut Sequence, options: &Options<'_>, setup: &Setup<'_>) -
     let admit =
         |sizes: &Sizes| opened.admit(&Sizes { picture: options.size.unwrap_or(sizes.picture), ..*sizes });
     let rest = sequence.at(1, setup.progress.as_ref(), &admit)?;
-    let tetrahedra = rest.scene.shell.cells.len() as u64;
+    let tetrahedra = rest.scene.shell.topology.tetrahedra.len() as u64;
     let mut walk = Walk {
         options,
         sorter: Sorter::new(&rest.scene.shell.topology),

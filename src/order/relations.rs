@@ -2,8 +2,8 @@
 //!
 //! Every sign is that of an exact adaptive predicate (Shewchuk 1997) on the world-space vertices, with
 //! the vertices of a face in one canonical order (ascending ids): both tetrahedra read the same sign, so
-//! rounding can make no false cycle. Which side of a face a tetrahedron lies on is the exact orientation of
-//! its fourth vertex, not its place in the mesh, so an inverted tetrahedron is related as it lies.
+//! rounding can make no false cycle. Which side of a face a tetrahedron lies on is the exact sign of its volume, not
+//! its place in the mesh, so an inverted tetrahedron is related as it lies.
 //!
 //! | the two tetrahedra of a face | relation | the face in the A-buffer |
 //! |---|---|---|
@@ -75,6 +75,11 @@ fn orientation(a: DVec3, b: DVec3, c: DVec3, d: DVec3) -> i8 {
     i8::from(determinant > 0.0) - i8::from(determinant < 0.0)
 }
 
+/// The [`orientation`] of the vertices of a tetrahedron, given six times its volume.
+fn orientation_of(determinant: f64) -> i8 {
+    i8::from(determinant < 0.0) - i8::from(determinant > 0.0)
+}
+
 /// The vertices of face `k` of a tetrahedron in canonical order, and the parity (+1, -1) of the
 /// permutation that takes the tetrahedron's vertices to them and vertex `k`.
 fn canonical_face(tetrahedron: [u32; 4], k: usize) -> ([u32; 3], i8) {
@@ -115,16 +120,10 @@ impl FaceTable {
         Self { faces }
     }
 
-    /// Relates the tetrahedra of `topology` (the one of [`FaceTable::new`]) as seen from `eye`.
-    /// `vertices` and `eye` are in world space.
-    pub fn relate(&self, topology: &Topology, vertices: &[DVec3], eye: DVec3) -> Relations {
+    /// Relates the tetrahedra of the topology of [`FaceTable::new`], whose volumes have the signs of `determinants` (see
+    /// [`Shell::determinants`](crate::shell::Shell::determinants)), as seen from `eye`. `vertices` and `eye` are in world space.
+    pub fn relate(&self, determinants: &[f64], vertices: &[DVec3], eye: DVec3) -> Relations {
         let at = |id: u32| vertices[id as usize];
-        let orientations: Vec<i8> = topology
-            .tetrahedra
-            .par_iter()
-            .with_min_len(1024)
-            .map(|t| orientation(at(t[0]), at(t[1]), at(t[2]), at(t[3])))
-            .collect();
         let eye_sides: Vec<i8> = self
             .faces
             .par_iter()
@@ -133,7 +132,7 @@ impl FaceTable {
             .collect();
 
         let mut pairs = Vec::with_capacity(self.faces.len());
-        let mut exit_faces = vec![0u8; topology.tetrahedra.len()];
+        let mut exit_faces = vec![0u8; determinants.len()];
         let mut boundary = Vec::new();
         for (face, &eye_side) in self.faces.iter().zip(&eye_sides) {
             if eye_side == 0 {
@@ -141,7 +140,7 @@ impl FaceTable {
             }
             let inner_side = |i: usize| match face.cells[i] {
                 EXTERIOR => 0,
-                cell => orientations[cell as usize] * face.parity[i],
+                cell => orientation_of(determinants[cell as usize]) * face.parity[i],
             };
             let sides = [inner_side(0), inner_side(1)];
             for (i, cell) in face.cells.into_iter().enumerate() {
@@ -182,7 +181,12 @@ mod tests {
 
     fn seen_from(z: f64, heights: [f64; 2]) -> Relations {
         let (topology, vertices) = two_on_a_face(heights);
-        FaceTable::new(&topology).relate(&topology, &vertices, DVec3::new(0.3, 0.1, z))
+        let determinants: Vec<f64> = topology
+            .tetrahedra
+            .iter()
+            .map(|ids| crate::shell::determinant(ids.map(|id| vertices[id as usize])))
+            .collect();
+        FaceTable::new(&topology).relate(&determinants, &vertices, DVec3::new(0.3, 0.1, z))
     }
 
     /// Tetrahedra with the shared face in the A-buffer.

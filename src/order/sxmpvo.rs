@@ -61,7 +61,7 @@ impl Sorter {
             lap - begin
         };
         let Relations { pairs, exit_faces, boundary } =
-            self.faces.relate(&shell.topology, &shell.vertices, eye);
+            self.faces.relate(&shell.determinants, &shell.vertices, eye);
         let relations = elapsed();
 
         let image_pairs = abuffer::relate(&shell.vertices, shell.topology.tetrahedra.len(), &boundary, view);

@@ -49,15 +49,16 @@ const EDGE_ON: f64 = 1e-13;
 impl Crossings {
     /// Prepares a shell for paths that are measured from this eye. Tetrahedra of zero volume are left out.
     pub fn new(shell: &Shell, eye: DVec3) -> Self {
-        let mut planes: Vec<[Plane; 4]> = Vec::with_capacity(shell.cells.len());
-        for tetrahedron in 0..shell.cells.len() {
+        let mut planes: Vec<[Plane; 4]> = Vec::with_capacity(shell.topology.tetrahedra.len());
+        for tetrahedron in 0..shell.topology.tetrahedra.len() {
             let own = std::array::from_fn(|face| match shared_plane(shell, &planes, tetrahedron, face) {
                 Some(plane) => plane,
                 None => own_plane(shell, eye, tetrahedron, face),
             });
             planes.push(own);
         }
-        let with_maps = (0..shell.cells.len()).filter(|&tetrahedron| shell.cells[tetrahedron].has_maps());
+        let with_maps =
+            (0..shell.topology.tetrahedra.len()).filter(|&tetrahedron| shell.has_maps(tetrahedron));
         let hulls = with_maps.map(|tetrahedron| {
             let vertices = shell.topology.tetrahedra[tetrahedron];
             (tetrahedron, vertices.map(|vertex| shell.vertices[vertex as usize] - eye))
@@ -117,7 +118,7 @@ impl Crossings {
 }
 
 fn own_plane(shell: &Shell, eye: DVec3, tetrahedron: usize, face: usize) -> Plane {
-    let gradient = shell.cells[tetrahedron].gradients[face];
+    let gradient = shell.cells()[tetrahedron].gradients[face];
     let on_face = shell.topology.tetrahedra[tetrahedron][(face + 1) % 4];
     let from_vertex = eye - shell.vertices[on_face as usize];
     let steepness = EDGE_ON * gradient.length();
@@ -132,7 +133,7 @@ fn shared_plane(shell: &Shell, planes: &[[Plane; 4]], tetrahedron: usize, face: 
         return None;
     }
     let neighbour = neighbour as usize;
-    if !shell.cells[neighbour].has_maps() {
+    if !shell.has_maps(neighbour) {
         return None;
     }
     let vertices = topology.tetrahedra[tetrahedron];
@@ -142,7 +143,7 @@ fn shared_plane(shell: &Shell, planes: &[[Plane; 4]], tetrahedron: usize, face: 
             && !is_on_face(topology.tetrahedra[neighbour][k])
     })?;
     let plane = planes[neighbour][back];
-    let gradient = shell.cells[tetrahedron].gradients[face];
+    let gradient = shell.cells()[tetrahedron].gradients[face];
     let turned = Plane { gradient: -plane.gradient, at_eye: -plane.at_eye, ..plane };
     Some(if gradient.dot(plane.gradient) < 0.0 { turned } else { plane })
 }

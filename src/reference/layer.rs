@@ -92,7 +92,7 @@ impl<'a, const N: usize> Layer<'a, N> {
         let shell = &scene.shell;
         let levels = &scene.volume.levels;
         let first_vertex = shell.vertices[shell.topology.tetrahedra[tetrahedron][0] as usize];
-        let texture_from_world = shell.cells[tetrahedron].texture_from_world;
+        let texture_from_world = shell.cells()[tetrahedron].texture_from_world;
         let from_vertex = (ray.eye - first_vertex) + (ray.start + start * ray.direction);
         let texture = shell.texture[tetrahedron][0] + texture_from_world * from_vertex;
         let texture_slope = texture_from_world * ray.direction;

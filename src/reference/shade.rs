@@ -43,7 +43,7 @@ impl<'a> Lit<'a> {
     /// Along the span of a layer, in its tetrahedron.
     pub fn surroundings(&self, tetrahedron: usize, ray: &Ray, layer: &Layer<'_>) -> Surroundings<'a> {
         let at_eye = self.shell.barycentric(tetrahedron, ray.eye);
-        let per_depth = self.shell.cells[tetrahedron].gradients.map(|gradient| gradient.dot(ray.direction));
+        let per_depth = self.shell.cells()[tetrahedron].gradients.map(|gradient| gradient.dot(ray.direction));
         let levels = &self.shading.directions.levels;
         let lattice = |level: usize| Lattice::new(&levels[level], layer.texture, layer.texture_slope);
         Surroundings {

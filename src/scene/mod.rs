@@ -153,7 +153,7 @@ impl Default for March {
 pub fn texel_edges(shell: &Shell, size: [u32; 3]) -> [f64; 3] {
     let mut edges = DVec3::ZERO;
     let mut volume = 0.0;
-    for (cell, vertices) in shell.cells.iter().zip(&shell.topology.tetrahedra) {
+    for (cell, vertices) in shell.cells().iter().zip(&shell.topology.tetrahedra) {
         let world_from_texture = cell.texture_from_world.inverse();
         if world_from_texture.is_finite() {
             let [a, b, c, d] = vertices.map(|vertex| shell.vertices[vertex as usize]);
@@ -194,7 +194,7 @@ impl Scene {
     /// The largest density of level-0 texels across a ray, along any texture axis in a tetrahedron, in texels
     /// per world unit: `max_i size_i |row_i of texture_from_world x direction| / |direction|`.
     pub fn texels_across(&self, tetrahedron: usize, direction: DVec3) -> f64 {
-        let map = self.shell.cells[tetrahedron].texture_from_world;
+        let map = self.shell.cells()[tetrahedron].texture_from_world;
         let size = self.volume.levels[0].size;
         let across = (0..3).map(|i| f64::from(size[i]) * map.row(i).cross(direction).length());
         across.fold(0.0, f64::max) / direction.length()

@@ -62,7 +62,7 @@ thickness_map = 'map.png'
             let shell = scene.shell;
             let base = shell.topology.base_vertices;
             let mut seen = [0, 0];
-            for (ids, texture) in shell.topology.tetrahedra.iter().zip(&shell.texture) {
+            for (ids, texture) in shell.topology.tetrahedra.iter().zip(&*shell.texture) {
                 for (&id, uvw) in ids.iter().zip(texture).filter(|(id, _)| **id >= base) {
                     // Rows of vertices lie an eighth apart. Those on edges between the halves see both.
                     let v = uvw.y - uvw.y.floor();

@@ -1,11 +1,11 @@
 //! Builds a shell from a mesh, and places it anew when the mesh's vertices have moved.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
-use super::{Cell, Health, Shell, ShellOptions, Topology, cell, extrude, health, limit};
+use super::{Health, Shell, ShellOptions, Topology, cell, extrude, health, limit};
 use crate::mesh::Mesh;
 use crate::{Error, Result};
 
@@ -24,8 +24,10 @@ impl Shell {
         let mut shell = Self {
             topology: Arc::new(Topology::of(mesh)?),
             vertices: Arc::default(),
-            texture: Vec::new(),
-            cells: Vec::new(),
+            texture: Arc::default(),
+            determinants: Vec::new(),
+            maps: OnceLock::new(),
+            uvs: Arc::default(),
             health: Health::default(),
             limit: None,
         };
@@ -33,22 +35,45 @@ impl Shell {
         Ok(shell)
     }
 
+    /// A shell of any tetrahedra, whose faces start at their smallest id as in a shell that is [built](Shell::build).
+    pub fn assemble(topology: Topology, vertices: Vec<DVec3>, texture: Vec<[DVec3; 4]>) -> Self {
+        let mut shell = Self {
+            topology: Arc::new(topology),
+            vertices: Arc::new(vertices),
+            texture: Arc::new(texture),
+            determinants: Vec::new(),
+            maps: OnceLock::new(),
+            uvs: Arc::default(),
+            health: Health::default(),
+            limit: None,
+        };
+        let faults = shell.measure();
+        shell.health = health::health(&shell.topology, faults, 0);
+        shell
+    }
+
     /// A shell for the same triangles with other positions, normals, UVs or options, which shares the topology with this one, and
-    /// the vertices where none has moved. `spare`, a shell that is no longer needed, may lend its memory.
+    /// the vertices and the texture coordinates where none has moved. `spare`, a shell that is no longer needed, may lend its memory.
     ///
     /// # Errors
     /// As [`Shell::rebuild`].
     pub fn moved(&self, mesh: &Mesh, options: &ShellOptions, spare: Option<Self>) -> Result<Self> {
-        let (texture, cells) = spare.map_or_else(Default::default, |spare| (spare.texture, spare.cells));
-        let (topology, vertices) = (self.topology.clone(), self.vertices.clone());
-        let health = Health::default();
-        let mut moved = Self { topology, vertices, texture, cells, health, limit: None };
+        let mut moved = Self {
+            topology: self.topology.clone(),
+            vertices: self.vertices.clone(),
+            texture: self.texture.clone(),
+            determinants: spare.map_or_else(Vec::new, |spare| spare.determinants),
+            maps: OnceLock::new(),
+            uvs: self.uvs.clone(),
+            health: Health::default(),
+            limit: None,
+        };
         moved.rebuild(mesh, options)?;
         Ok(moved)
     }
 
     /// Builds the shell again for the same triangles with other positions, normals, UVs or options, and
-    /// keeps its topology, and its vertices where none has moved. On an error the shell is as before.
+    /// keeps its topology, and its vertices and texture coordinates where none has moved. On an error the shell is as before.
     ///
     /// # Errors
     /// As [`Shell::build`], and [`Error::Usage`] where the number of positions or the triangles differ from
@@ -88,32 +113,37 @@ impl Shell {
         }
 
         let topology = &*self.topology;
-        let vertices = &*self.vertices;
         let texture_map = options.texture_map();
-        let tetrahedra = topology.tetrahedra.par_iter().with_min_len(TASK);
-        tetrahedra
-            .clone()
-            .zip(&topology.corners)
-            .enumerate()
-            .map(|(t, (ids, corners))| {
-                let uvs = mesh.uvs[t / 3].map(&texture_map);
-                texture_coordinates(uvs, ids.map(|id| id >= topology.base_vertices), *corners)
-            })
-            .collect_into_vec(&mut self.texture);
+        let uvs: Vec<_> = mesh.uvs.iter().map(|corners| corners.map(&texture_map)).collect();
+        if uvs != *self.uvs {
+            let corners = topology.tetrahedra.par_iter().zip(&topology.corners).enumerate();
+            let coordinates = corners.with_min_len(TASK).map(|(t, (ids, corners))| {
+                texture_coordinates(uvs[t / 3], ids.map(|id| id >= topology.base_vertices), *corners)
+            });
+            self.texture = Arc::new(coordinates.collect());
+            self.uvs = Arc::new(uvs);
+        }
 
-        self.cells.resize(topology.tetrahedra.len(), Cell::default());
-        let faults = tetrahedra
-            .zip(&self.texture)
-            .zip(&mut self.cells)
-            .map(|((ids, texture), cell)| {
-                let corners = ids.map(|id| vertices[id as usize]);
-                let determinant = cell::determinant(corners);
-                *cell = cell::maps(corners, *texture, determinant);
-                health::Faults::of(corners, determinant, cell)
-            })
-            .reduce(health::Faults::default, |x, y| x + y);
+        let faults = self.measure();
         let overlap = health::overlap_risk_vertices(mesh, options, &directions);
-        self.health = health::health(topology, faults, overlap);
+        self.health = health::health(&self.topology, faults, overlap);
+    }
+
+    /// Finds the volume of every tetrahedron; what maps there were are forgotten.
+    fn measure(&mut self) -> health::Faults {
+        self.maps = OnceLock::new();
+        let (topology, vertices) = (&*self.topology, &*self.vertices);
+        self.determinants.resize(topology.tetrahedra.len(), 0.0);
+        let tetrahedra = topology.tetrahedra.par_iter().zip(&*self.texture).with_min_len(TASK);
+        let faults = tetrahedra.zip(&mut self.determinants).map(|((ids, texture), determinant)| {
+            let corners = ids.map(|id| vertices[id as usize]);
+            let squared_edges = health::squared_edges(corners);
+            let largest = texture.iter().fold(0.0, |largest: f64, at| largest.max(at.abs().max_element()));
+            let exact = cell::determinant(corners);
+            *determinant = if cell::are_finite(exact, squared_edges, largest) { exact } else { 0.0 };
+            health::Faults::of(*determinant, squared_edges)
+        });
+        faults.reduce(health::Faults::default, |x, y| x + y)
     }
 }
 

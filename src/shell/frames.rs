@@ -43,7 +43,7 @@ impl Shell {
     /// The frames for one kind of direction.
     pub fn frames(&self, kind: FrameKind) -> Frames {
         // A corner is a vertex as one tetrahedron has it: `4 t + k`.
-        let mut groups = Groups::new(4 * self.cells.len());
+        let mut groups = Groups::new(4 * self.topology.tetrahedra.len());
         for (t, neighbours) in self.topology.neighbours.iter().enumerate() {
             for (face, &neighbour) in neighbours.iter().enumerate() {
                 if neighbour != EXTERIOR && (neighbour as usize) > t {
@@ -51,10 +51,11 @@ impl Shell {
                 }
             }
         }
-        let mut frames = Frames { maps: Vec::new(), of_vertices: vec![[0; 4]; self.cells.len()] };
-        let mut frame_of_group = vec![u32::MAX; 4 * self.cells.len()];
+        let mut frames =
+            Frames { maps: Vec::new(), of_vertices: vec![[0; 4]; self.topology.tetrahedra.len()] };
+        let mut frame_of_group = vec![u32::MAX; 4 * self.topology.tetrahedra.len()];
         let mut volumes: Vec<f64> = Vec::new();
-        for t in 0..self.cells.len() {
+        for t in 0..self.topology.tetrahedra.len() {
             let (map, volume) = self.map_and_volume(t, kind);
             for k in 0..4 {
                 let frame = &mut frame_of_group[groups.root(4 * t + k)];
@@ -83,7 +84,7 @@ impl Shell {
 
     /// The map of one tetrahedron, and its weight: none where there is no such map.
     fn map_and_volume(&self, t: usize, kind: FrameKind) -> (DMat3, f64) {
-        let texture_from_world = self.cells[t].texture_from_world;
+        let texture_from_world = self.cells()[t].texture_from_world;
         let map = match kind {
             FrameKind::Covectors => texture_from_world.transpose(),
             FrameKind::Vectors if texture_from_world.determinant() == 0.0 => DMat3::ZERO,
@@ -106,7 +107,7 @@ impl Shell {
             let largest = self.texture[t][k].abs().max_element().max(1.0);
             (apart((k, other)) - turns).abs().max_element() <= SAME_PLACE * largest
         });
-        let handedness = |t: usize| self.cells[t].texture_from_world.determinant();
+        let handedness = |t: usize| self.cells()[t].texture_from_world.determinant();
         if goes_on && handedness(t) * handedness(neighbour) > 0.0 {
             for (k, other) in shared.into_iter().flatten() {
                 groups.join(4 * t + k, 4 * neighbour + other);
@@ -190,7 +191,7 @@ mod tests {
         for kind in [FrameKind::Covectors, FrameKind::Vectors] {
             let frames = shell.frames(kind);
             let along = |map: DMat3| (map * DVec3::Z).normalize();
-            for t in 0..shell.cells.len() {
+            for t in 0..shell.topology.tetrahedra.len() {
                 let own = along(shell.map_and_volume(t, kind).0);
                 // Triangles of 48 x 36 rows differ by 10 degrees from their neighbours.
                 let cosine = along(frames.at(t, [0.25; 4])).dot(own);
@@ -222,7 +223,9 @@ mod tests {
             for kind in [FrameKind::Covectors, FrameKind::Vectors] {
                 let frames = shell.frames(kind);
                 assert!(frames.maps.iter().all(DMat3::is_finite));
-                let zero = (0..shell.cells.len()).filter(|&t| frames.at(t, [0.25; 4]) == DMat3::ZERO).count();
+                let zero = (0..shell.topology.tetrahedra.len())
+                    .filter(|&t| frames.at(t, [0.25; 4]) == DMat3::ZERO)
+                    .count();
                 assert_eq!(zero, if kind == FrameKind::Vectors { degenerate } else { 0 });
             }
         }

@@ -17,7 +17,7 @@ use std::ops::Add;
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::{Cell, Health, SLIVER_QUALITY, Shell, ShellOptions, Topology, cell, extrude};
+use super::{Health, SLIVER_QUALITY, Shell, ShellOptions, Topology, cell, extrude};
 use crate::mesh::Mesh;
 
 /// How many tetrahedra have which fault.
@@ -29,15 +29,15 @@ pub(super) struct Faults {
 }
 
 impl Faults {
-    /// Those of one tetrahedron, given six times its volume.
-    pub(super) fn of(vertices: [DVec3; 4], determinant: f64, cell: &Cell) -> Self {
-        if !cell.has_maps() {
+    /// Those of one tetrahedron, given its entry of [`Shell::determinants`] and the sum of its squared edges.
+    pub(super) fn of(determinant: f64, squared_edges: f64) -> Self {
+        if determinant == 0.0 {
             return Self { zero_volume: 1, ..Self::default() };
         }
         Self {
             inverted: u64::from(determinant < 0.0),
             zero_volume: 0,
-            slivers: u64::from(quality(vertices, determinant) < SLIVER_QUALITY),
+            slivers: u64::from(quality(squared_edges, determinant) < SLIVER_QUALITY),
         }
     }
 }
@@ -91,14 +91,18 @@ impl Shell {
 
     /// Shape quality of tetrahedron `t`, 0 (flat) to 1 (regular): `6 sqrt(2) |V| / l_rms^3`. See [`SLIVER_QUALITY`].
     pub fn quality(&self, t: usize) -> f64 {
-        quality(self.vertices_of(t), self.determinant(t))
+        quality(squared_edges(self.vertices_of(t)), self.determinant(t))
     }
 }
 
-/// Shape quality, 0 (flat) to 1 (regular), given six times the signed volume.
-fn quality([a, b, c, d]: [DVec3; 4], determinant: f64) -> f64 {
-    let edges = [b - a, c - a, d - a, c - b, d - b, d - c];
-    let mean_square = edges.iter().map(|edge| edge.length_squared()).sum::<f64>() / 6.0;
+/// The sum of the squared lengths of the six edges.
+pub(super) fn squared_edges([a, b, c, d]: [DVec3; 4]) -> f64 {
+    [b - a, c - a, d - a, c - b, d - b, d - c].iter().map(|edge| edge.length_squared()).sum()
+}
+
+/// Shape quality, 0 (flat) to 1 (regular), given the sum of the squared edges and six times the signed volume.
+fn quality(squared_edges: f64, determinant: f64) -> f64 {
+    let mean_square = squared_edges / 6.0;
     SQRT_2 * determinant.abs() / (mean_square * mean_square.sqrt())
 }
 
@@ -158,11 +162,11 @@ mod tests {
         for scale in [1e-6, 1.0, 1e6] {
             let vertices = REGULAR.map(|v| scale * v);
             // Ten or so roundings.
-            assert!((quality(vertices, cell::determinant(vertices)) - 1.0).abs() < 1e-14);
+            assert!((quality(squared_edges(vertices), cell::determinant(vertices)) - 1.0).abs() < 1e-14);
         }
         let mut bent = REGULAR;
         bent[0].x += 0.1;
-        assert!(quality(bent, cell::determinant(bent)) < 1.0 - 1e-4);
+        assert!(quality(squared_edges(bent), cell::determinant(bent)) < 1.0 - 1e-4);
     }
 
     /// The corner of a cube lowered to height `h`: `det = h`, squared edges 1, 1, 2, h2, 1 + h2, 1 + h2.
@@ -171,15 +175,14 @@ mod tests {
         let h = 0.01f64;
         let vertices = [DVec3::ZERO, DVec3::X, DVec3::Y, h * DVec3::Z];
         let expected = SQRT_2 * h / (1.0 + 0.5 * h * h).powf(1.5);
-        assert!((quality(vertices, h) / expected - 1.0).abs() < 1e-14);
+        assert!((quality(squared_edges(vertices), h) / expected - 1.0).abs() < 1e-14);
     }
 
     #[test]
     fn faults_are_told_apart() {
         let faults = |vertices: [DVec3; 4]| {
             let determinant = cell::determinant(vertices);
-            let found = cell::maps(vertices, REGULAR, determinant);
-            let Faults { inverted, zero_volume, slivers } = Faults::of(vertices, determinant, &found);
+            let Faults { inverted, zero_volume, slivers } = Faults::of(determinant, squared_edges(vertices));
             [inverted, zero_volume, slivers]
         };
         let lowered = |h: f64| [DVec3::ZERO, DVec3::X, DVec3::Y, h * DVec3::Z];

@@ -25,11 +25,12 @@ mod limit;
 mod topology;
 mod wind;
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 pub(crate) use cell::determinant;
 pub use frames::{FrameKind, Frames};
 use glam::{DAffine3, DMat3, DVec2, DVec3, DVec4};
+use rayon::prelude::*;
 pub use wind::Wind;
 
 /// In [`Topology::neighbours`]: no tetrahedron lies beyond that face.
@@ -64,13 +65,6 @@ pub struct Cell {
     pub gradients: [DVec3; 4],
     /// Linear part of the map from world space to texture space (u, v, w).
     pub texture_from_world: DMat3,
-}
-
-impl Cell {
-    /// Whether there are maps: nothing is drawn of a tetrahedron without.
-    pub fn has_maps(&self) -> bool {
-        self.gradients != [DVec3::ZERO; 4]
-    }
 }
 
 /// How the shell is built from the mesh.
@@ -119,7 +113,7 @@ pub struct Health {
 pub const SLIVER_QUALITY: f64 = 1e-3;
 
 /// The extruded, split mesh with its maps.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct Shell {
     /// Shared between the frames of a deforming mesh.
     pub topology: Arc<Topology>,
@@ -129,9 +123,14 @@ pub struct Shell {
     ///
     /// u and v repeat, so the largest whole numbers that leave none of the four negative are taken off
     /// (the same for all four, and for the whole prism): what is left keeps its precision in f32.
-    pub texture: Vec<[DVec3; 4]>,
-    /// One a tetrahedron.
-    pub cells: Vec<Cell>,
+    pub texture: Arc<Vec<[DVec3; 4]>>,
+    /// Six times the signed volume of each tetrahedron, in cubic world units, with the exact sign: negative where it is inverted. Zero
+    /// also where it has a volume so near zero that its maps would not be finite.
+    pub determinants: Vec<f64>,
+    /// See [`Shell::cells`], which makes them when they are first needed.
+    pub maps: OnceLock<Vec<Cell>>,
+    /// What `texture` was made from: the transformed UVs of each triangle.
+    uvs: Arc<Vec<[DVec2; 3]>>,
     /// Counted when the shell was built.
     pub health: Health,
     /// Where it was made thinner than asked.
@@ -150,7 +149,7 @@ pub struct Limit {
 }
 
 /// The corners of face `k`, counter-clockwise seen from outside a tetrahedron of positive volume.
-pub(crate) const FACES: [[usize; 3]; 4] = [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]];
+const FACES: [[usize; 3]; 4] = [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]];
 
 impl ShellOptions {
     /// A shell of even thickness (world units) along the mesh's own normals, with its own UVs.
@@ -179,7 +178,31 @@ impl Topology {
     }
 }
 
+impl PartialEq for Shell {
+    fn eq(&self, other: &Self) -> bool {
+        let Self { topology, vertices, texture, determinants, maps: _, uvs: _, health, limit } = self;
+        (topology, vertices, texture) == (&other.topology, &other.vertices, &other.texture)
+            && (determinants, health, limit) == (&other.determinants, &other.health, &other.limit)
+    }
+}
+
 impl Shell {
+    /// The maps of each tetrahedron. They are made when they are first asked for: a frame of an unlit scene needs none.
+    pub fn cells(&self) -> &[Cell] {
+        if self.maps.get().is_none() {
+            let map = |t| cell::maps(self.vertices_of(t), self.texture[t], self.determinants[t]);
+            // Outside of the lock: a thread of the pool that waited for it could be the one to make them.
+            let maps = (0..self.determinants.len()).into_par_iter().map(map).collect();
+            let _ = self.maps.set(maps); // unless another was faster, with the same
+        }
+        self.maps.get().expect("set above")
+    }
+
+    /// Whether tetrahedron `t` has maps: nothing is drawn of one without.
+    pub fn has_maps(&self, t: usize) -> bool {
+        self.determinants[t] != 0.0
+    }
+
     /// World-space vertices of tetrahedron `t`.
     pub fn vertices_of(&self, t: usize) -> [DVec3; 4] {
         self.topology.tetrahedra[t].map(|id| self.vertices[id as usize])
@@ -196,7 +219,7 @@ impl Shell {
     /// use [`Cell::texture_from_world`] relative to a vertex. Where the [`Cell`] is zero, everything maps to
     /// the first vertex's texture coordinates.
     pub fn texture_from_world(&self, t: usize) -> DAffine3 {
-        let linear = self.cells[t].texture_from_world;
+        let linear = self.cells()[t].texture_from_world;
         let [origin, ..] = self.vertices_of(t);
         DAffine3 { matrix3: linear, translation: self.texture[t][0] - linear * origin }
     }
@@ -209,7 +232,7 @@ impl Shell {
         std::array::from_fn(|k| {
             let corners = self.face(t, k).map(|id| self.vertices[id as usize]);
             let area = cell::area_vector(corners);
-            let inward = self.cells[t].gradients[k].dot(area);
+            let inward = self.cells()[t].gradients[k].dot(area);
             if inward == 0.0 {
                 return DVec4::ZERO;
             }
@@ -222,6 +245,6 @@ impl Shell {
     /// where the [`Cell`] is zero.
     pub fn barycentric(&self, t: usize, point: DVec3) -> [f64; 4] {
         let vertices = self.vertices_of(t);
-        std::array::from_fn(|k| self.cells[t].gradients[k].dot(point - vertices[FACES[k][0]]))
+        std::array::from_fn(|k| self.cells()[t].gradients[k].dot(point - vertices[FACES[k][0]]))
     }
 }

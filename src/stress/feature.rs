@@ -83,7 +83,7 @@ fn eye_on_feature(stand: &Stand<'_>) -> Result<f64> {
     let any = view(DVec3::Z, DVec3::ZERO, 60.0, 1e-3, pixels);
     let scene = Arc::new(constant_scene(&mesh, 0.25, 0.4, 0.8, any)?);
     let mut views = Vec::new();
-    for t in (0..scene.shell.cells.len()).step_by(stand.either(43, 7)) {
+    for t in (0..scene.shell.topology.tetrahedra.len()).step_by(stand.either(43, 7)) {
         let [a, b, c, d] = scene.shell.vertices_of(t);
         let eyes = [a, d, 0.5 * (a + d), 0.25 * b + 0.75 * c, (a + b + c) / 3.0, 0.25 * (a + b + c + d)];
         // Along an edge of the tetrahedron, then across.

@@ -4,12 +4,12 @@ use std::collections::HashMap;
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
-use glam::{DMat3, DVec3};
+use glam::DVec3;
 
 use crate::Result;
 use crate::mesh::Mesh;
 use crate::scene::{Camera, March, Medium, Scene, View};
-use crate::shell::{Cell, EXTERIOR, Health, Shell, ShellOptions, Topology};
+use crate::shell::{EXTERIOR, Shell, ShellOptions, Topology};
 use crate::volume::{Pyramid, Quantity, Volume};
 
 /// A straight linear colour and an alpha.
@@ -72,16 +72,8 @@ pub fn loose(corners: &[[DVec3; 4]], texture: &[DVec3]) -> Shell {
 /// A shell of tetrahedra given by vertex ids, ascending but for the last two, each at one point of the texture;
 /// neighbours are those that share three ids.
 pub fn connected(vertices: Vec<DVec3>, tetrahedra: Vec<[u32; 4]>, texture: &[DVec3]) -> Shell {
-    let corners: Vec<[DVec3; 4]> = tetrahedra.iter().map(|ids| ids.map(|id| vertices[id as usize])).collect();
     let topology = Topology { neighbours: neighbours(&tetrahedra), tetrahedra, ..Topology::default() };
-    Shell {
-        health: Health { tetrahedra: corners.len() as u64, ..Health::default() },
-        topology: Arc::new(topology),
-        vertices: Arc::new(vertices),
-        texture: texture.iter().map(|point| [*point; 4]).collect(),
-        cells: corners.iter().map(cell).collect(),
-        limit: None,
-    }
+    Shell::assemble(topology, vertices, texture.iter().map(|point| [*point; 4]).collect())
 }
 
 fn neighbours(tetrahedra: &[[u32; 4]]) -> Vec<[u32; 4]> {
@@ -103,13 +95,6 @@ fn neighbours(tetrahedra: &[[u32; 4]]) -> Vec<[u32; 4]> {
         }
     }
     neighbours
-}
-
-fn cell(&[a, b, c, d]: &[DVec3; 4]) -> Cell {
-    // Rows of the inverse of the edges are the gradients of the coordinates of b, c and d.
-    let inverse = DMat3::from_cols(b - a, c - a, d - a).inverse();
-    let [b, c, d] = [0, 1, 2].map(|i| inverse.row(i));
-    Cell { gradients: [-(b + c + d), b, c, d], texture_from_world: DMat3::ZERO }
 }
 
 /// A bar whose high end lies over the low end of the next, a third of a turn further.

@@ -40,7 +40,7 @@ fn brute_force(scene: &Scene, view: &View, direction: DVec3, range: [f64; 2], st
     let (mut colour, mut depth) = ([0.0; 4], 0.0_f64);
     let dz = (range[1] - range[0]) / f64::from(steps);
     let ds = dz * direction.length() / scene.medium.opacity_distance;
-    let mut candidates: Vec<usize> = (0..shell.cells.len()).collect();
+    let mut candidates: Vec<usize> = (0..shell.topology.tetrahedra.len()).collect();
     candidates.retain(|&t| {
         // Tetrahedra whose bounding sphere the ray meets.
         let vertices = shell.vertices_of(t);
@@ -57,7 +57,7 @@ fn brute_force(scene: &Scene, view: &View, direction: DVec3, range: [f64; 2], st
                 continue;
             }
             let texture = (0..4).map(|k| b[k] * shell.texture[t][k]).sum();
-            let map = shell.cells[t].texture_from_world.transpose();
+            let map = shell.cells()[t].texture_from_world.transpose();
             let across = |i: usize| map.col(i).reject_from(direction).length();
             let rho = (0..3).map(|i| size[i] * across(i)).fold(0.0, f64::max);
             let last = scene.volume.levels.len() - 1;

@@ -122,7 +122,7 @@ impl Lit {
             let per_height = cell.gradients.map(|gradient| (gradient.length() * seen.unit) as f32);
             LitCell { frames, per_height }
         };
-        shell.cells.par_iter().zip(&self.of_vertices).map(cell).collect()
+        shell.cells().par_iter().zip(&self.of_vertices).map(cell).collect()
     }
 }
 

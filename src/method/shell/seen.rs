@@ -12,7 +12,6 @@ use rayon::prelude::*;
 use super::outline::{Projection, Unseen};
 use crate::order::{Order, Sorted};
 use crate::scene::{Scene, View};
-use crate::shell::{Cell as Maps, FACES};
 
 /// `Cell` of `glsl/include/shell.glsl`: see there for each member.
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
@@ -95,7 +94,7 @@ impl Seen {
             seen.list.clear();
         }
         // In the order of the tetrahedra, since that is how all that is read and written here lies in memory.
-        seen.cells.resize(scene.shell.cells.len(), Cell::zeroed());
+        seen.cells.resize(scene.shell.topology.tetrahedra.len(), Cell::zeroed());
         let cells = seen.cells.par_iter_mut().zip(&sorted.exit_faces).enumerate().with_min_len(TASK);
         let mut found = Vec::new();
         cells.map(|(t, (cell, &exit_faces))| eye.map(t, exit_faces, cell)).collect_into_vec(&mut found);
@@ -257,8 +256,8 @@ impl<'a> Eye<'a> {
     /// Fills in the cell of a tetrahedron, where it is seen.
     fn map(&self, t: usize, exit_faces: u8, cell: &mut Cell) -> Found {
         let shell = &self.scene.shell;
-        let Maps { gradients, texture_from_world } = &shell.cells[t];
-        if exit_faces == 0 || !shell.cells[t].has_maps() {
+        let determinant = shell.determinants[t];
+        if exit_faces == 0 || determinant == 0.0 {
             return Found::WithoutVolume;
         }
         let vertices = self.vertices(t);
@@ -272,21 +271,31 @@ impl<'a> Eye<'a> {
         let [a, b, c, d] = outline.map(|corner| clip(corner).as_vec2());
         cell.outline = [[a.x, a.y, b.x, b.y], [c.x, c.y, d.x, d.y]];
 
+        // Both cells at a face go round it from the same corner, one of them the other way: its area vector is the same in both to
+        // the bit, up to its sign. It points outwards in the world where the volume is positive; view space is its mirror image.
+        let [origin, corners @ ..] = shell.vertices_of(t);
+        let edges = corners.map(|corner| self.view_from_world * (corner - origin));
+        let apart =
+            [corners[1] - corners[0], corners[2] - corners[0]].map(|edge| self.view_from_world * edge);
+        let areas = [
+            apart[0].cross(apart[1]),
+            edges[2].cross(edges[1]),
+            edges[0].cross(edges[2]),
+            edges[1].cross(edges[0]),
+        ];
         let per_unit = self.unit.recip();
         cell.planes = std::array::from_fn(|k| {
-            // Both cells at a face go round it from the same corner, one of them the other way: their planes are equal up to the
-            // sign.
-            let [p, q, r] = FACES[k].map(|corner| positions[corner]);
-            let area = (q - p).cross(r - p);
-            let inward = area.dot(self.view_from_world * gradients[k]);
-            let normal = area * (area.length_squared().sqrt().recip().copysign(inward));
-            normal.as_vec3().extend((normal.dot(p) * per_unit) as f32).into()
+            let normal = areas[k] * areas[k].length_squared().sqrt().recip().copysign(determinant);
+            let on_face = positions[usize::from(k == 0)];
+            normal.as_vec3().extend((normal.dot(on_face) * per_unit) as f32).into()
         });
-        let texture_from_view = *texture_from_world * self.view_from_world.transpose();
-        let texture_at_eye = shell.texture[t][0] - texture_from_view * positions[0];
-        let rows = texture_from_view.transpose().to_cols_array_2d().map(DVec3::from);
+        let texture = &shell.texture[t];
+        let per_volume = determinant.recip();
+        let slopes = [1, 2, 3].map(|k| (texture[k] - texture[0]) * per_volume);
+        let rows = [0, 1, 2].map(|i| (0..3).map(|k| slopes[k][i] * areas[k + 1]).sum::<DVec3>());
         cell.texture = std::array::from_fn(|i| {
-            (rows[i] * self.unit).as_vec3().extend(texture_at_eye[i] as f32).into()
+            let at_eye = texture[0][i] - rows[i].dot(positions[0]);
+            (rows[i] * self.unit).as_vec3().extend(at_eye as f32).into()
         });
         let farthest = positions.map(|position| position.z).into_iter().fold(f64::NEG_INFINITY, f64::max);
         // Of all directions, so at least that across the ray.

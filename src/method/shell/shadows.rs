@@ -258,7 +258,7 @@ impl Shadows {
     fn add_picture(&self, drawn: &mut Drawn, scene: &Scene, index: usize) {
         let view = &self.views[index];
         let lens = Lens::new(view, self.side);
-        let found = (0..scene.shell.cells.len()).into_par_iter();
+        let found = (0..scene.shell.topology.tetrahedra.len()).into_par_iter();
         let mut found: Vec<(Cell, Bounds, bool)> = found.filter_map(|t| lens.cell(scene, t)).collect();
         // Members that come about nearest first are sorted quickly in every pixel.
         found.par_sort_by(|a, b| a.1.nearest.total_cmp(&b.1.nearest));
@@ -409,8 +409,8 @@ impl<'a> Lens<'a> {
 
     /// A tetrahedron, where it is, and whether more than level 0 can be needed in it; `None` where none of it is seen.
     fn cell(&self, scene: &Scene, t: usize) -> Option<(Cell, Bounds, bool)> {
-        let Shell { cells, vertices, texture, .. } = &*scene.shell;
-        if !cells[t].has_maps() {
+        let Shell { vertices, texture, .. } = &*scene.shell;
+        if !scene.shell.has_maps(t) {
             return None;
         }
         let unit = self.view.far;
@@ -424,7 +424,8 @@ impl<'a> Lens<'a> {
             let normal = planes[k].truncate();
             (self.light_from_world * normal).as_vec3().extend((normal.dot(on_face) / unit) as f32).into()
         });
-        let texture_from_light = cells[t].texture_from_world * self.light_from_world.transpose() * unit;
+        let texture_from_light =
+            scene.shell.cells()[t].texture_from_world * self.light_from_world.transpose() * unit;
         let at_origin = texture[t][0] - texture_from_light * corners[0];
         let rows =
             std::array::from_fn(|i| texture_from_light.row(i).as_vec3().extend(at_origin[i] as f32).into());

@@ -20,7 +20,8 @@ impl Shell {
         let model = |scene: &Scene| scene.shading.as_ref().map(|shading| shading.model);
         let size = scene.volume.levels[0].size;
         let mut kept = Vec::new();
-        let texels = if same_shell && size == before.volume.levels[0].size {
+        let same_texture = Arc::ptr_eq(&before.shell.texture, &scene.shell.texture);
+        let texels = if same_texture && size == before.volume.levels[0].size {
             self.texels
         } else {
             longest_span(&scene)?
