@@ -1,19 +1,10 @@
-//! Relations across gaps: an A-buffer of the shell's boundary faces at the image's pixel centres.
-//!
-//! Along a pixel's ray the tetrahedra of a connected run are related face by face; between two runs the
-//! tetrahedron that the ray leaves last is related to the one that it enters next.
-//!
-//! ```text
-//!   eye ----[ A | B ]-------[ C | D | E ]------>      boundary faces: in A, out B, in C, out E
-//!            A<B by a face   C<D<E by faces            the A-buffer adds B<C
-//! ```
+//! The A-buffer (L. Carpenter, "The A-buffer, an antialiased hidden surface method", 1984): where the ray of each pixel leaves the
+//! shell and enters it, front to back.
 //!
 //! Against section 4.1 of Dufort, Leblanc, Poulin 2005:
 //! - faces are sampled in f64 by edge functions of the homogeneous triangle (Olano, Greer 1997), linear in
 //!   pixel coordinates whether or not vertices lie behind the eye: nothing is clipped, and only points
 //!   in front of the eye are met (the near plane plays no part);
-//! - runs may overlap where the shell overlaps itself. No order of theirs is right, so they are made one
-//!   cycle: each tetrahedron that such a ray leaves is also put in front of each that it enters;
 //! - samples stand 1e-10 pixels off the pixel centres: a symmetric scene sends rays exactly through edges and
 //!   vertices, where rounding would decide on its own which faces are met, and in which order.
 //!
@@ -190,21 +181,27 @@ impl Footprint {
 
 /// What a boundary face does to a ray: it leaves a tetrahedron, or enters it. Ordered: leaves first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-struct Crossing(u32);
+pub(super) struct Crossing(u32);
 
 impl Crossing {
     const ENTERS: u32 = 1 << 31;
 
-    fn new(face: &BoundaryFace) -> Self {
-        debug_assert!(face.cell < Self::ENTERS);
-        Self(if face.leaves { face.cell } else { face.cell | Self::ENTERS })
+    pub(super) fn new(face: &BoundaryFace) -> Self {
+        let place = face.cell << 2 | u32::from(face.local);
+        debug_assert!(face.cell < 1 << 29, "a shell has fewer tetrahedra");
+        Self(if face.leaves { place } else { place | Self::ENTERS })
     }
 
-    fn cell(self) -> u32 {
+    pub(super) fn cell(self) -> u32 {
+        self.place() >> 2
+    }
+
+    /// Four times the tetrahedron, and the number of its face.
+    pub(super) fn place(self) -> u32 {
         self.0 & !Self::ENTERS
     }
 
-    fn leaves(self) -> bool {
+    pub(super) fn leaves(self) -> bool {
         self.0 & Self::ENTERS == 0
     }
 }
@@ -218,66 +215,72 @@ struct Fragment {
     next: u32,
 }
 
-/// Working memory of one thread, kept between bands.
-struct Scratch {
+/// The boundary faces of a shell in a view, by the bands of rows that they reach into.
+pub(super) struct ABuffer {
+    raster: Raster,
+    footprints: Vec<Footprint>,
+    /// Footprints, of each band.
+    bands: Vec<Vec<u32>>,
+}
+
+/// The crossings of one band's pixels; its memory is used again for the next.
+pub(super) struct Band {
     /// First fragment of each pixel of the band.
     heads: Vec<u32>,
     fragments: Vec<Fragment>,
-    /// The fragments of one pixel.
+    /// The fragments of one pixel, and their crossings.
     list: Vec<Fragment>,
-    /// Tetrahedra by which the ray entered, and left, the runs that it is in, and left those before them.
-    entered: Vec<u32>,
-    left: Vec<u32>,
-    left_before: Vec<u32>,
-    /// For each tetrahedron the last one that was found in front of it: neighbouring pixels say the same.
-    last_front: Vec<u32>,
+    crossings: Vec<Crossing>,
 }
 
-/// Relates tetrahedra across gaps: lists of `[front, back]`, with duplicates.
-///
-/// `vertices` are in world space, `boundary` is [`Relations::boundary`](super::relations::Relations::boundary)
-/// for the eye of `view`, and `tetrahedra` is their number. The set of pairs does not depend on threads.
-pub fn relate(
-    vertices: &[DVec3],
-    tetrahedra: usize,
-    boundary: &[BoundaryFace],
-    view: &View,
-) -> Vec<Vec<[u32; 2]>> {
-    let raster = Raster {
-        width: view.width as usize,
-        height: view.height as usize,
-        pixel: view.pixel_at_unit_depth(),
-    };
-    let frame = view.camera.frame();
-    let from_eye = |&vertex: &DVec3| {
-        let offset = vertex - view.camera.eye;
-        DVec3::new(frame.right.dot(offset), -frame.up.dot(offset), frame.forward.dot(offset))
-    };
-    let vertices: Vec<DVec3> = vertices.par_iter().with_min_len(1024).map(from_eye).collect();
-    let footprints: Vec<Footprint> = boundary
-        .par_iter()
-        .with_min_len(256)
-        .filter_map(|face| Footprint::new(face, &vertices, raster))
-        .collect();
+impl ABuffer {
+    /// `vertices` are in world space, `boundary` is [`Relations::boundary`](super::relations::Relations::boundary) for the eye of
+    /// `view`.
+    pub(super) fn new(vertices: &[DVec3], boundary: &[BoundaryFace], view: &View) -> Self {
+        let raster = Raster {
+            width: view.width as usize,
+            height: view.height as usize,
+            pixel: view.pixel_at_unit_depth(),
+        };
+        let frame = view.camera.frame();
+        let from_eye = |&vertex: &DVec3| {
+            let offset = vertex - view.camera.eye;
+            DVec3::new(frame.right.dot(offset), -frame.up.dot(offset), frame.forward.dot(offset))
+        };
+        let vertices: Vec<DVec3> = vertices.par_iter().with_min_len(1024).map(from_eye).collect();
+        let footprints: Vec<Footprint> = boundary
+            .par_iter()
+            .with_min_len(256)
+            .filter_map(|face| Footprint::new(face, &vertices, raster))
+            .collect();
+        let bands = footprints_of_bands(&footprints, raster);
+        Self { raster, footprints, bands }
+    }
 
-    let scratch = || Scratch {
-        heads: vec![NONE; raster.width * BAND],
-        fragments: Vec::new(),
-        list: Vec::new(),
-        entered: Vec::new(),
-        left: Vec::new(),
-        left_before: Vec::new(),
-        last_front: vec![NONE; tetrahedra],
-    };
-    let bands = footprints_of_bands(&footprints, raster);
-    bands
-        .par_iter()
-        .enumerate()
-        .map_init(scratch, |scratch, (band, members)| {
-            scratch.collect_fragments(band, members, &footprints, raster);
-            scratch.relate_pixels()
-        })
-        .collect()
+    /// What `visit` makes of each band, from the top of the picture down; each thread that works on some has a state of its own.
+    pub(super) fn map_bands<S, T: Send>(
+        &self,
+        state: impl Fn() -> S + Sync + Send,
+        visit: impl Fn(&mut S, &mut Band) -> T + Sync + Send,
+    ) -> Vec<T> {
+        let band = || Band {
+            heads: vec![NONE; self.raster.width * BAND],
+            fragments: Vec::new(),
+            list: Vec::new(),
+            crossings: Vec::new(),
+        };
+        self.bands
+            .par_iter()
+            .enumerate()
+            .map_init(
+                || (state(), band()),
+                |(state, band), (number, members)| {
+                    band.collect_fragments(number, members, &self.footprints, self.raster);
+                    visit(state, band)
+                },
+            )
+            .collect()
+    }
 }
 
 /// For each band of rows, the footprints that reach into it.
@@ -292,10 +295,12 @@ fn footprints_of_bands(footprints: &[Footprint], raster: Raster) -> Vec<Vec<u32>
     bands
 }
 
-impl Scratch {
+impl Band {
     /// Fills the lists of the pixels of one band.
     fn collect_fragments(&mut self, band: usize, members: &[u32], footprints: &[Footprint], raster: Raster) {
-        self.heads.fill(NONE);
+        let rows_here = (raster.height - band * BAND).min(BAND);
+        self.heads.clear();
+        self.heads.resize(raster.width * rows_here, NONE);
         self.fragments.clear();
         let first_row = band * BAND;
         for &id in members {
@@ -315,66 +320,21 @@ impl Scratch {
         }
     }
 
-    /// Sorts the lists and follows each ray.
-    fn relate_pixels(&mut self) -> Vec<[u32; 2]> {
-        let mut pairs = Vec::new();
-        for pixel in 0..self.heads.len() {
+    /// Calls `visit` with what each pixel's ray crosses, front to back: row by row.
+    pub(super) fn each_pixel(&mut self, mut visit: impl FnMut(&[Crossing])) {
+        for &head in &self.heads {
             self.list.clear();
-            let mut next = self.heads[pixel];
+            let mut next = head;
             while next != NONE {
                 let fragment = self.fragments[next as usize];
                 self.list.push(fragment);
                 next = fragment.next;
             }
-            if self.list.len() < 2 {
-                continue;
-            }
             sort_front_to_back(&mut self.list);
-            self.follow_ray(&mut pairs);
+            self.crossings.clear();
+            self.crossings.extend(self.list.iter().map(|fragment| fragment.crossing));
+            visit(&self.crossings);
         }
-        pairs
-    }
-
-    /// Relates what one ray leaves to what it enters next; `self.list` is sorted.
-    fn follow_ray(&mut self, pairs: &mut Vec<[u32; 2]>) {
-        let leaves = self.list.iter().filter(|fragment| fragment.crossing.leaves()).count();
-        // Every run ends in front of the eye; those that do not begin there hold the eye.
-        let mut open_runs = (2 * leaves).saturating_sub(self.list.len());
-        let mut overlap = open_runs > 1;
-        self.entered.clear();
-        self.left.clear();
-        self.left_before.clear();
-        for index in 0..self.list.len() {
-            let crossing = self.list[index].crossing;
-            if crossing.leaves() {
-                open_runs = open_runs.saturating_sub(1);
-                self.left.push(crossing.cell());
-            } else {
-                overlap |= open_runs > 0;
-                open_runs += 1;
-                self.entered.push(crossing.cell());
-            }
-            if open_runs == 0 || index + 1 == self.list.len() {
-                self.relate_runs(overlap, pairs);
-                overlap = false;
-            }
-        }
-    }
-
-    /// Relates runs that the ray is in together, one as a rule, to those before them, and to one another.
-    fn relate_runs(&mut self, overlap: bool, pairs: &mut Vec<[u32; 2]>) {
-        for &back in &self.entered {
-            let within: &[u32] = if overlap { &self.left } else { &[] };
-            for &front in self.left_before.iter().chain(within) {
-                if front != back && self.last_front[back as usize] != front {
-                    self.last_front[back as usize] = front;
-                    pairs.push([front, back]);
-                }
-            }
-        }
-        self.entered.clear();
-        std::mem::swap(&mut self.left_before, &mut self.left);
-        self.left.clear();
     }
 }
 
@@ -391,60 +351,6 @@ mod tests {
     use super::*;
     use crate::scene::Camera;
 
-    /// The pairs of a stack of faces on the axis, each given as `(depth, tetrahedron, leaves)`.
-    fn pairs_of(stack: &[(f64, u32, bool)]) -> Vec<[u32; 2]> {
-        let mut list: Vec<Fragment> = stack
-            .iter()
-            .map(|&(depth, cell, leaves)| {
-                let face = BoundaryFace { vertices: [0; 3], cell, leaves, eye_side: 1 };
-                Fragment { inverse_depth: depth.recip(), crossing: Crossing::new(&face), next: NONE }
-            })
-            .collect();
-        sort_front_to_back(&mut list);
-        let last_front = vec![NONE; stack.len()];
-        let mut scratch = Scratch {
-            heads: vec![],
-            fragments: vec![],
-            list,
-            entered: vec![],
-            left: vec![],
-            left_before: vec![],
-            last_front,
-        };
-        let mut pairs = vec![];
-        scratch.follow_ray(&mut pairs);
-        pairs
-    }
-
-    #[test]
-    fn what_a_ray_leaves_is_in_front_of_what_it_enters_next() {
-        let outside = [(1.0, 0, false), (2.0, 1, true), (3.0, 2, false), (4.0, 3, true), (5.0, 4, false)];
-        assert_eq!(pairs_of(&outside), [[1, 2], [3, 4]]);
-        let inside = [(1.0, 0, true), (2.0, 1, false), (3.0, 2, true)];
-        assert_eq!(pairs_of(&inside), [[0, 1]]);
-        let in_one_place = [(2.0, 1, false), (2.0, 0, true), (1.0, 2, false), (3.0, 3, true)];
-        assert_eq!(pairs_of(&in_one_place), [[0, 1]]);
-    }
-
-    #[test]
-    fn runs_that_overlap_are_one_cycle_between_their_neighbours() {
-        // A run ends with 0; then the runs 1..3 and 2..4 overlap, and run 5 follows both.
-        let stack = [
-            (0.5, 6, false),
-            (1.0, 0, true),
-            (2.0, 1, false),
-            (3.0, 2, false),
-            (4.0, 3, true),
-            (5.0, 4, true),
-            (6.0, 5, false),
-            (7.0, 5, true),
-        ];
-        // With 1 before 3 and 2 before 4 by their faces, 1 3 2 4 are a cycle.
-        let mut pairs = pairs_of(&stack);
-        pairs.sort_unstable();
-        assert_eq!(pairs, [[0, 1], [0, 2], [3, 1], [3, 2], [3, 5], [4, 1], [4, 2], [4, 5]]);
-    }
-
     #[test]
     fn faces_that_reach_behind_the_eye_cover_what_their_part_in_front_projects_to() {
         let camera = Camera { eye: DVec3::ZERO, target: -DVec3::Z, up: DVec3::Y, fov_y: 1.2, near: 0.1 };
@@ -454,7 +360,7 @@ mod tests {
         let corners = [DVec3::new(0.0, 1.0, 1e6), DVec3::new(1e7, 1.0, -1e6), DVec3::new(-1e7, 1.0, -1e6)];
         let orientation = corners[0].dot(corners[1].cross(corners[2]));
         let eye_side = if orientation > 0.0 { 1 } else { -1 };
-        let face = BoundaryFace { vertices: [0, 1, 2], cell: 0, leaves: false, eye_side };
+        let face = BoundaryFace { vertices: [0, 1, 2], cell: 0, local: 3, leaves: false, eye_side };
         let footprint = Footprint::new(&face, &corners, raster).unwrap();
         for y in 0..30 {
             let covered = footprint.covered(y, raster);

@@ -5,7 +5,7 @@
 //! turned round to front to back:
 //!
 //! 1. [`relations`]: of two tetrahedra that share a face, the one on the eye's side is in front;
-//! 2. [`abuffer`]: where a pixel's ray leaves the shell and enters it again, the tetrahedron that it
+//! 2. `gaps`: where a pixel's ray leaves the shell and enters it again, the tetrahedron that it
 //!    leaves is in front of the one that it enters;
 //! 3. [`search`]: a depth-first search of that graph emits every tetrahedron after all in front of it.
 //!
@@ -13,8 +13,9 @@
 //! cycle. Cycles are found exactly and reported; intersections (a shell that overlaps itself) have no right
 //! order where they are, and [`check()`] counts them apart.
 
-pub mod abuffer;
+mod abuffer;
 pub mod check;
+mod gaps;
 pub mod relations;
 pub mod search;
 pub mod sxmpvo;

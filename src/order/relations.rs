@@ -50,6 +50,8 @@ pub struct BoundaryFace {
     pub vertices: [u32; 3],
     /// The tetrahedron.
     pub cell: u32,
+    /// The face's number in it.
+    pub local: u8,
     /// A ray from the eye leaves the tetrahedron here; else it enters.
     pub leaves: bool,
     /// +1 or -1: the sign of `p . (q x r)` for the vertices relative to the eye.
@@ -150,7 +152,8 @@ impl FaceTable {
                 let leaves = sides[i] == eye_side;
                 exit_faces[cell as usize] |= u8::from(leaves) << face.local[i];
                 if sides[1 - i] != -sides[i] {
-                    boundary.push(BoundaryFace { vertices: face.vertices, cell, leaves, eye_side });
+                    let (vertices, local) = (face.vertices, face.local[i]);
+                    boundary.push(BoundaryFace { vertices, cell, local, leaves, eye_side });
                 }
             }
             let [first, second] = face.cells;

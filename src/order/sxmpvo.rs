@@ -4,9 +4,10 @@ use std::time::{Duration, Instant};
 
 use glam::DVec3;
 
+use super::abuffer::ABuffer;
 use super::relations::{FaceTable, Relations};
 use super::search::InFront;
-use super::{Order, abuffer};
+use super::{Order, gaps};
 use crate::scene::View;
 use crate::shell::{Shell, Topology};
 
@@ -64,7 +65,10 @@ impl Sorter {
             self.faces.relate(&shell.determinants, &shell.vertices, eye);
         let relations = elapsed();
 
-        let image_pairs = abuffer::relate(&shell.vertices, shell.topology.tetrahedra.len(), &boundary, view);
+        let image_pairs = {
+            let abuffer = ABuffer::new(&shell.vertices, &boundary, view);
+            gaps::relate(&abuffer, shell.topology.tetrahedra.len())
+        };
         let abuffer = elapsed();
 
         let mut lists: Vec<&[[u32; 2]]> = vec![&pairs];
