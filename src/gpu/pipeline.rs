@@ -37,6 +37,8 @@ pub struct PipelineInfo<'a> {
     pub constants: &'a [u32],
     /// Bindings in set 0 of the storage buffers that either shader reads.
     pub storage_buffers: &'a [u32],
+    /// Bindings in set 0 of the buffers of texels that the fragment shader reads.
+    pub texel_buffers: &'a [u32],
     /// Bindings in set 0 of the textures that the fragment shader reads.
     pub textures: &'a [u32],
     /// Size of the push constants, in bytes: 4 to 128, a multiple of 4.
@@ -54,6 +56,7 @@ pub struct Pipeline {
     pool: vk::DescriptorPool,
     pub(super) set: vk::DescriptorSet,
     buffers: Vec<u32>,
+    texel_buffers: Vec<u32>,
     textures: Vec<u32>,
     push_constant_bytes: u32,
     /// Of the targets that it draws into.
@@ -87,6 +90,7 @@ impl Pipeline {
             pool: vk::DescriptorPool::null(),
             set: vk::DescriptorSet::null(),
             buffers: info.storage_buffers.to_vec(),
+            texel_buffers: info.texel_buffers.to_vec(),
             textures: info.textures.to_vec(),
             push_constant_bytes: info.push_constant_bytes,
             format: target.format,
@@ -178,6 +182,11 @@ impl Pipeline {
                 vk::DescriptorType::STORAGE_BUFFER,
                 vk::ShaderStageFlags::VERTEX | vk::ShaderStageFlags::FRAGMENT,
             ),
+            (
+                &self.texel_buffers,
+                vk::DescriptorType::UNIFORM_TEXEL_BUFFER,
+                vk::ShaderStageFlags::FRAGMENT,
+            ),
             (&self.textures, vk::DescriptorType::COMBINED_IMAGE_SAMPLER, vk::ShaderStageFlags::FRAGMENT),
         ];
         for (numbers, kind, stages) in kinds {
@@ -241,12 +250,16 @@ impl Pipeline {
 
     /// Panics where a binding of the pipeline is not among those given.
     pub(super) fn bind(&self, buffers: &[(u32, &Buffer)], textures: &[(u32, Sampled<'_>)]) {
-        let buffer_infos = self.buffers.iter().map(|&binding| {
+        let buffer = |binding: &u32| -> &Buffer {
             let (_, buffer) =
-                buffers.iter().find(|(one, _)| *one == binding).expect("a buffer for each binding");
-            [vk::DescriptorBufferInfo { buffer: buffer.raw, offset: 0, range: vk::WHOLE_SIZE }]
+                buffers.iter().find(|(one, _)| one == binding).expect("a buffer for each binding");
+            buffer
+        };
+        let buffer_infos = self.buffers.iter().map(|binding| {
+            [vk::DescriptorBufferInfo { buffer: buffer(binding).raw, offset: 0, range: vk::WHOLE_SIZE }]
         });
         let buffer_infos: Vec<_> = buffer_infos.collect();
+        let views: Vec<_> = self.texel_buffers.iter().map(|binding| [buffer(binding).view]).collect();
         let image_infos = self.textures.iter().map(|&binding| {
             let (_, texture) =
                 textures.iter().find(|(one, _)| *one == binding).expect("a texture for each binding");
@@ -263,13 +276,17 @@ impl Pipeline {
         for (binding, info) in self.buffers.iter().zip(&buffer_infos) {
             writes.push(write(binding).descriptor_type(vk::DescriptorType::STORAGE_BUFFER).buffer_info(info));
         }
+        for (binding, view) in self.texel_buffers.iter().zip(&views) {
+            let of_texels = write(binding).descriptor_type(vk::DescriptorType::UNIFORM_TEXEL_BUFFER);
+            writes.push(of_texels.texel_buffer_view(view));
+        }
         for (binding, info) in self.textures.iter().zip(&image_infos) {
             writes.push(
                 write(binding).descriptor_type(vk::DescriptorType::COMBINED_IMAGE_SAMPLER).image_info(info),
             );
         }
         // SAFETY: the set is in no pending submission, since each is waited for, by the only thread that has the pipeline;
-        // the infos live through the call.
+        // the infos and views live through the call.
         unsafe { self.gpu.raw.update_descriptor_sets(&writes, &[]) };
     }
 }

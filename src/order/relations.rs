@@ -36,6 +36,32 @@ struct Face {
     parity: [i8; 2],
 }
 
+impl Face {
+    /// On which side of the face each of its tetrahedra lies: the sign of `p . (q x r)` for its vertices relative to the fourth; 0
+    /// where there is none, or none with volume.
+    fn sides(&self, determinants: &[f64]) -> [i8; 2] {
+        [0, 1].map(|i| match self.cells[i] {
+            EXTERIOR => 0,
+            cell => orientation_of(determinants[cell as usize]) * self.parity[i],
+        })
+    }
+
+    /// The face as each of its tetrahedra has it, beyond which no other is known to follow.
+    fn boundary(&self, sides: [i8; 2], eye_side: i8) -> [Option<BoundaryFace>; 2] {
+        [0, 1].map(|i| {
+            let is_boundary = eye_side != 0 && sides[i] != 0 && sides[1 - i] != -sides[i];
+            let (vertices, cell, local) = (self.vertices, self.cells[i], self.local[i]);
+            is_boundary.then_some(BoundaryFace {
+                vertices,
+                cell,
+                local,
+                leaves: sides[i] == eye_side,
+                eye_side,
+            })
+        })
+    }
+}
+
 /// The faces of a topology; kept while vertices move.
 #[derive(Debug, Clone)]
 pub struct FaceTable {
@@ -122,6 +148,35 @@ impl FaceTable {
         Self { faces }
     }
 
+    /// The faces that the A-buffer needs, as in [`Relations::boundary`], in the same order.
+    pub fn boundary(&self, determinants: &[f64], vertices: &[DVec3], eye: DVec3) -> Vec<BoundaryFace> {
+        let at = |id: u32| vertices[id as usize];
+        let of = |face: &Face| {
+            let sides = face.sides(determinants);
+            let is_boundary = sides[0] != -sides[1];
+            let [a, b, c] = face.vertices;
+            let eye_side = if is_boundary { orientation(at(a), at(b), at(c), eye) } else { 0 };
+            face.boundary(sides, eye_side).into_iter().flatten()
+        };
+        let faces = self.faces.par_iter().with_min_len(1024);
+        faces.map(of).flatten_iter().collect()
+    }
+
+    /// For each face of each tetrahedron the place, four times a tetrahedron and the number of its face, where a ray goes on that
+    /// leaves through it; [`EXTERIOR`] where it does not: outside, at a fold, and at a tetrahedron without volume.
+    pub fn beyond(&self, determinants: &[f64]) -> Vec<u32> {
+        let mut beyond = vec![EXTERIOR; 4 * determinants.len()];
+        for face in &self.faces {
+            let sides = face.sides(determinants);
+            if sides[0] == -sides[1] && sides[0] != 0 {
+                let places = [0, 1].map(|i| 4 * face.cells[i] + u32::from(face.local[i]));
+                beyond[places[0] as usize] = places[1];
+                beyond[places[1] as usize] = places[0];
+            }
+        }
+        beyond
+    }
+
     /// Relates the tetrahedra of the topology of [`FaceTable::new`], whose volumes have the signs of `determinants` (see
     /// [`Shell::determinants`](crate::shell::Shell::determinants)), as seen from `eye`. `vertices` and `eye` are in world space.
     pub fn relate(&self, determinants: &[f64], vertices: &[DVec3], eye: DVec3) -> Relations {
@@ -140,22 +195,13 @@ impl FaceTable {
             if eye_side == 0 {
                 continue;
             }
-            let inner_side = |i: usize| match face.cells[i] {
-                EXTERIOR => 0,
-                cell => orientation_of(determinants[cell as usize]) * face.parity[i],
-            };
-            let sides = [inner_side(0), inner_side(1)];
+            let sides = face.sides(determinants);
             for (i, cell) in face.cells.into_iter().enumerate() {
-                if sides[i] == 0 {
-                    continue;
-                }
-                let leaves = sides[i] == eye_side;
-                exit_faces[cell as usize] |= u8::from(leaves) << face.local[i];
-                if sides[1 - i] != -sides[i] {
-                    let (vertices, local) = (face.vertices, face.local[i]);
-                    boundary.push(BoundaryFace { vertices, cell, local, leaves, eye_side });
+                if sides[i] != 0 {
+                    exit_faces[cell as usize] |= u8::from(sides[i] == eye_side) << face.local[i];
                 }
             }
+            boundary.extend(face.boundary(sides, eye_side).into_iter().flatten());
             let [first, second] = face.cells;
             if second != EXTERIOR && sides[0] != sides[1] {
                 let first_in_front = sides[0] == eye_side || sides[1] == -eye_side;

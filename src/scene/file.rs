@@ -14,6 +14,7 @@ use toml::Spanned;
 use super::Background;
 use super::Model;
 use super::PIXEL_FOOTPRINT;
+use super::Traversal;
 use super::camera::DEFAULT_FOV_DEGREES;
 use super::motion::{DeformSection, TransformSection};
 use super::shading::DEFAULT_SHADOW_SIZE;
@@ -297,6 +298,8 @@ pub struct MarchSection {
     pub step: Step,
     /// In each tetrahedron: see [`March::Paper`](super::March::Paper).
     pub samples: Samples,
+    /// See [`Traversal`].
+    pub traversal: Traversal,
 }
 
 /// `[shading]`: see [`Shading`](super::Shading) for what the numbers mean.
@@ -365,7 +368,12 @@ impl Default for ImageSection {
 
 impl Default for MarchSection {
     fn default() -> Self {
-        Self { plan: Plan::Default, step: Step(0.5), samples: Samples(10) }
+        Self {
+            plan: Plan::Default,
+            step: Step(0.5),
+            samples: Samples(10),
+            traversal: Traversal::default(),
+        }
     }
 }
 

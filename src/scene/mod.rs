@@ -76,6 +76,8 @@ pub struct Scene {
     pub view: View,
     /// How finely the `shell` method marches.
     pub march: March,
+    /// How it goes from tetrahedron to tetrahedron.
+    pub traversal: Traversal,
 }
 
 /// What a scene asks of a device, known before its volume is computed.
@@ -127,6 +129,17 @@ pub enum March {
     /// Optical depth is exact where the texture holds extinction. Tetrahedra in cycles are marched by midpoints all the same,
     /// eight a texel.
     Exact,
+}
+
+/// How the `shell` method goes from one tetrahedron on a ray to the next.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Traversal {
+    /// Each ray walks by adjacency, and stops where nothing more is seen. Plans other than the default are drawn in order all the same.
+    #[default]
+    Walk,
+    /// All tetrahedra are sorted, and drawn in that order, as in the 2005 paper.
+    Sort,
 }
 
 impl fmt::Display for March {
@@ -188,6 +201,7 @@ impl Scene {
             solids: Arc::default(),
             view: View { camera, width: 512, height: 512, depth: false },
             march: March::default(),
+            traversal: Traversal::default(),
         }
     }
 

@@ -380,6 +380,7 @@ impl Parts {
                 Plan::Paper => March::Paper { samples: file.march.samples.0 },
                 Plan::Exact => March::Exact,
             },
+            traversal: file.march.traversal,
             shading: shading.transpose()?,
             solids,
             shell,

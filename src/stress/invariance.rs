@@ -18,7 +18,7 @@ use crate::mesh::Mesh;
 use crate::mesh::generate::{Generator, Plane, Torus};
 use crate::metric;
 use crate::reference;
-use crate::scene::{March, Medium, Scene, View};
+use crate::scene::{March, Medium, Scene, Traversal, View};
 use crate::shell::{Shell, ShellOptions};
 use crate::volume::{Pyramid, Quantity, Volume};
 
@@ -96,6 +96,7 @@ fn in_waves(mesh: &Mesh, scale: f64, view: View) -> Result<Arc<Scene>> {
         solids: Arc::default(),
         view,
         march: March::default(),
+        traversal: Traversal::default(),
     }))
 }
 

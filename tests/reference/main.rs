@@ -10,7 +10,7 @@ mod solids;
 
 use glam::{DVec2, DVec3};
 use mesoshell::mesh::generate::{Generator, Plane, Torus};
-use mesoshell::scene::{Camera, Emission, Light, March, Medium, Model, Scene, Shading, Source, View};
+use mesoshell::scene::{Camera, Emission, Light, March, Medium, Model, Scene, Shading, Source, Traversal, View};
 use mesoshell::shell::{Shell, ShellOptions};
 use mesoshell::volume::{Directions, Pyramid, Volume};
 use rand::{RngExt, SeedableRng};
@@ -82,6 +82,7 @@ fn scene(shell: Shell, volume: Pyramid, view: View) -> Scene {
         solids: [].into(),
         view,
         march: March::Default { step: 1.0 },
+        traversal: Traversal::default(),
     }
 }
 

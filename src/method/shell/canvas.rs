@@ -1,10 +1,11 @@
 //! What a frame of one size and kind needs on the device beside the scene: its target, pipelines and the buffers of what is seen.
 
-use super::Shell;
 use super::constants::{ViewConstants, constants_of_volume};
-use super::lit::{Lit, LitView, Sight};
+use super::lit::{Lit, LitView, Sight as LitSight};
 use super::seen::{Run, Seen};
 use super::solids::SolidView;
+use super::walk::{self, Starts, Ways};
+use super::{Shell, Sight};
 use crate::gpu::{Batch, Buffer, Keeps, Pipeline, PipelineInfo, Target, shaders};
 use crate::scene::{Model, View};
 use crate::{Error, Result};
@@ -13,22 +14,41 @@ use crate::{Error, Result};
 pub(super) struct Canvas {
     kind: CanvasKind,
     pub(super) target: Target,
-    sorted: Pipeline,
-    /// For cycles, where there are any.
-    cycle: Option<Pipeline>,
     cells: Buffer,
-    tiles: Buffer,
-    list: Buffer,
+    medium: Medium,
     /// In a lit scene.
     pub(super) lit: Option<LitView>,
     /// Where there are solids: their picture, and what lays it behind the medium.
     pub(super) solids: Option<(SolidView, Pipeline)>,
 }
 
+/// What draws the medium, with what each way needs beside the cells.
+enum Medium {
+    Sorted {
+        pipeline: Pipeline,
+        /// For cycles, where there are any.
+        cycle: Option<Pipeline>,
+        tiles: Buffer,
+        list: Buffer,
+    },
+    Walked {
+        pipeline: Pipeline,
+        starts: Starts,
+    },
+}
+
 impl Canvas {
     /// By the binding that shaders name.
-    pub(super) fn buffers<'a>(&'a self, lit: Option<&'a Lit>) -> Vec<(u32, &'a Buffer)> {
-        let mut buffers = vec![(0, &self.cells), (1, &self.tiles), (2, &self.list)];
+    pub(super) fn buffers<'a>(&'a self, lit: Option<&'a Lit>, ways: Option<&'a Ways>) -> Vec<(u32, &'a Buffer)> {
+        let mut buffers = Vec::new();
+        match &self.medium {
+            Medium::Sorted { tiles, list, .. } => buffers.extend([(0, &self.cells), (1, tiles), (2, list)]),
+            Medium::Walked { starts, .. } => {
+                buffers.push((18, &self.cells));
+                buffers.extend(starts.buffers());
+                buffers.extend(ways.map(|ways| (19, ways.beyond())));
+            }
+        }
         if let (Some(lit), Some(view)) = (lit, &self.lit) {
             buffers.extend([(3, &view.cells), (4, &lit.frames)]);
             buffers.extend(view.lights());
@@ -36,12 +56,24 @@ impl Canvas {
         buffers
     }
 
-    pub(super) fn batch(&self, run: &Run) -> Batch<'_> {
-        let (pipeline, quads) = match run {
-            Run::Sorted(cells) => (&self.sorted, cells),
-            Run::Cycle(tiles) => (self.cycle.as_ref().expect("built where there are cycles"), tiles),
-        };
-        Batch { pipeline, vertices: 6 * quads.start..6 * quads.end }
+    /// What is drawn of the medium, in order.
+    pub(super) fn batches(&self, seen: &Seen) -> Vec<Batch<'_>> {
+        match &self.medium {
+            Medium::Sorted { pipeline, cycle, .. } => {
+                let batch = |run: &Run| {
+                    let (pipeline, quads) = match run {
+                        Run::Sorted(cells) => (pipeline, cells),
+                        Run::Cycle(tiles) => (cycle.as_ref().expect("built where there are cycles"), tiles),
+                    };
+                    Batch { pipeline, vertices: 6 * quads.start..6 * quads.end }
+                };
+                seen.runs.iter().map(batch).collect()
+            }
+            Medium::Walked { pipeline, .. } => {
+                let vertices = walk::vertices([self.kind.width, self.kind.height]);
+                vec![Batch { pipeline, vertices: 0..vertices }]
+            }
+        }
     }
 }
 
@@ -52,6 +84,7 @@ pub(super) struct CanvasKind {
     height: u32,
     depth: bool,
     cycles: bool,
+    walks: bool,
     /// What is compiled into the shaders: what the scene has, and what is asked for.
     switches: Vec<&'static str>,
     /// Their specialisation constants.
@@ -65,31 +98,38 @@ impl Shell {
         &self,
         kept: Option<Canvas>,
         kind: CanvasKind,
+        sight: &Sight,
         seen: &Seen,
         view: &View,
         is_uploaded: bool,
     ) -> Result<Canvas> {
         let Some(mut canvas) = kept.filter(|canvas| canvas.kind == kind) else {
-            return self.new_canvas(kind, seen, view);
+            return self.new_canvas(kind, sight, seen, view);
         };
         if !is_uploaded {
             canvas.cells.refill(&seen.cells)?;
-            canvas.tiles.refill(&seen.tiles)?;
-            canvas.list.refill(&seen.list)?;
+            match (&mut canvas.medium, sight) {
+                (Medium::Sorted { tiles, list, .. }, _) => {
+                    tiles.refill(&seen.tiles)?;
+                    list.refill(&seen.list)?;
+                }
+                (Medium::Walked { starts, .. }, Sight::Walked(entries)) => starts.refill(entries)?,
+                (Medium::Walked { .. }, Sight::Sorted(_)) => unreachable!("a canvas of another kind"),
+            }
         }
-        if let (Some(lit), Some(kept), Some(sight)) = (&self.lit, &mut canvas.lit, self.sight(seen, view)) {
+        if let (Some(lit), Some(kept), Some(sight)) = (&self.lit, &mut canvas.lit, self.lit_sight(seen, view)) {
             kept.refill(lit, sight, !is_uploaded)?;
         }
         Ok(canvas)
     }
 
     /// In a lit scene.
-    fn sight<'a>(&'a self, seen: &'a Seen, view: &'a View) -> Option<Sight<'a>> {
+    fn lit_sight<'a>(&'a self, seen: &'a Seen, view: &'a View) -> Option<LitSight<'a>> {
         let shading = self.scene.shading.as_ref()?;
-        Some(Sight { shading, shadows: self.shadows(), shell: &self.scene.shell, seen, view })
+        Some(LitSight { shading, shadows: self.shadows(), shell: &self.scene.shell, seen, view })
     }
 
-    pub(super) fn kind(&self, seen: &Seen, view: &View) -> CanvasKind {
+    pub(super) fn kind(&self, sight: &Sight, seen: &Seen, view: &View) -> CanvasKind {
         let switches = [
             ("DEPTH", view.depth),
             ("SOLIDS", self.solids.is_some()),
@@ -105,15 +145,16 @@ impl Shell {
             height: view.height,
             depth: view.depth,
             cycles: !seen.tiles.is_empty(),
+            walks: matches!(sight, Sight::Walked(_)),
             switches: switches.into_iter().filter_map(|(name, is_on)| is_on.then_some(name)).collect(),
             constants,
         }
     }
 
-    fn new_canvas(&self, kind: CanvasKind, seen: &Seen, view: &View) -> Result<Canvas> {
+    fn new_canvas(&self, kind: CanvasKind, sight: &Sight, seen: &Seen, view: &View) -> Result<Canvas> {
         let target = Target::new(&self.gpu, kind.width, kind.height, if kind.depth { 2 } else { 1 })?;
         let on = &kind.switches;
-        let mut buffers = vec![0, 1, 2];
+        let mut buffers = if kind.walks { Vec::new() } else { vec![0, 1, 2] };
         let mut textures = vec![8];
         for &switch in on {
             let (more_buffers, more_textures): (&[u32], &[u32]) = match switch {
@@ -133,17 +174,40 @@ impl Shell {
             fragment: shaders::SHELL_FRAG.with(on),
             constants: &kind.constants,
             storage_buffers: &buffers,
+            texel_buffers: &[],
             textures: &textures,
             push_constant_bytes: size_of::<ViewConstants>() as u32,
             keeps: Keeps::Blend,
         };
-        let sorted = Pipeline::new(&self.gpu, &target, &info)?;
-        let of_cycles = PipelineInfo {
-            vertex: shaders::TILE_VERT.with(on),
-            fragment: shaders::CYCLE_FRAG.with(on),
-            ..info
+        let (cells, medium) = match sight {
+            Sight::Sorted(_) => {
+                let of_cycles = PipelineInfo {
+                    vertex: shaders::TILE_VERT.with(on),
+                    fragment: shaders::CYCLE_FRAG.with(on),
+                    ..info
+                };
+                let cycle = kind.cycles.then(|| Pipeline::new(&self.gpu, &target, &of_cycles));
+                let medium = Medium::Sorted {
+                    pipeline: Pipeline::new(&self.gpu, &target, &info)?,
+                    cycle: cycle.transpose()?,
+                    tiles: Buffer::storage(&self.gpu, "the tiles of cycles", &seen.tiles)?,
+                    list: Buffer::storage(&self.gpu, "the tetrahedra in order", &seen.list)?,
+                };
+                (Buffer::storage(&self.gpu, "the tetrahedra", &seen.cells)?, medium)
+            }
+            Sight::Walked(entries) => {
+                let walked = PipelineInfo {
+                    vertex: shaders::WALK_VERT.with(on),
+                    fragment: shaders::WALK_FRAG.with(on),
+                    texel_buffers: &[18, 19, 20, 21],
+                    ..info
+                };
+                let pipeline = Pipeline::new(&self.gpu, &target, &walked)?;
+                let starts = Starts::new(&self.gpu, entries)?;
+                let cells = Buffer::floats(&self.gpu, "the tetrahedra", &seen.cells)?;
+                (cells, Medium::Walked { pipeline, starts })
+            }
         };
-        let cycle = kind.cycles.then(|| Pipeline::new(&self.gpu, &target, &of_cycles)).transpose()?;
         let solids = self.solids.as_ref().map(|_| {
             let layer = PipelineInfo {
                 vertex: shaders::LAYER_VERT.with(on),
@@ -155,20 +219,10 @@ impl Shell {
             };
             Ok::<_, Error>((SolidView::new(&self.gpu, view, on)?, Pipeline::new(&self.gpu, &target, &layer)?))
         });
-        let lit = match (&self.lit, self.sight(seen, view)) {
+        let lit = match (&self.lit, self.lit_sight(seen, view)) {
             (Some(lit), Some(sight)) => Some(LitView::new(&self.gpu, lit, sight)?),
             _ => None,
         };
-        Ok(Canvas {
-            kind,
-            sorted,
-            cycle,
-            cells: Buffer::storage(&self.gpu, "the tetrahedra", &seen.cells)?,
-            tiles: Buffer::storage(&self.gpu, "the tiles of cycles", &seen.tiles)?,
-            list: Buffer::storage(&self.gpu, "the tetrahedra in order", &seen.list)?,
-            lit,
-            solids: solids.transpose()?,
-            target,
-        })
+        Ok(Canvas { kind, cells, medium, lit, solids: solids.transpose()?, target })
     }
 }

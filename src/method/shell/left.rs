@@ -18,7 +18,7 @@ const TOLERANCE: f64 = 1e-6;
 /// # Errors
 /// [`Error::Interrupted`](crate::Error::Interrupted) soon after the flag is set.
 pub fn fill(
-    seen: &Seen,
+    seen: Option<&Seen>,
     scene: &Scene,
     view: &View,
     rgba: &mut [[f32; 4]],
@@ -27,10 +27,10 @@ pub fn fill(
     interrupt: &Interrupt,
 ) -> Result<u64> {
     let place = |pixel: usize| ((pixel % view.width as usize) as u32, (pixel / view.width as usize) as u32);
-    let is_tiled = seen.is_tiled(view);
+    let is_tiled = seen.map(|seen| seen.is_tiled(view));
     let is_left = |&pixel: &usize| {
         let (x, y) = place(pixel);
-        !rgba[pixel][3].is_finite() && is_tiled(x, y)
+        !rgba[pixel][3].is_finite() && is_tiled.as_ref().is_none_or(|is_tiled| is_tiled(x, y))
     };
     let left: Vec<usize> = (0..rgba.len()).filter(is_left).collect();
     if left.is_empty() {

@@ -17,6 +17,7 @@ pub mod seen;
 pub mod shadows;
 pub mod solids;
 mod update;
+mod walk;
 
 use std::sync::Arc;
 
@@ -28,13 +29,14 @@ use self::lit::{Lit, LitView};
 use self::seen::Seen;
 use self::shadows::Shadows;
 use self::solids::Solids;
+use self::walk::Ways;
 use super::{Method, Setup};
 use crate::frame::{Frame, Image, Stopwatch};
 use crate::gpu::{Batch, Draw, Gpu, Sampled, Texture3d, draw};
-use crate::order::{Sorted, Sorter};
+use crate::order::{Entries, Sorted, Sorter};
 use crate::progress::{Interrupt, Progress};
-use crate::scene::{Scene, Sizes, View, span};
-use crate::shell;
+use crate::scene::{March, Scene, Sizes, Traversal, View, span};
+use crate::shell::{self, Topology};
 use crate::{Error, Result};
 
 /// A scene on a device.
@@ -43,7 +45,10 @@ struct Shell {
     gpu: Arc<Gpu>,
     progress: Arc<dyn Progress>,
     interrupt: Interrupt,
-    sorter: Sorter,
+    /// Once it was needed; of the topology that it was made for.
+    sorter: Option<(Arc<Topology>, Sorter)>,
+    /// Once they were needed.
+    ways: Option<Ways>,
     volume: Texture3d,
     /// In a lit scene.
     lit: Option<Lit>,
@@ -64,9 +69,17 @@ struct Shell {
 struct Last {
     view: View,
     vertices: Arc<Vec<DVec3>>,
-    sorted: Sorted,
+    sight: Sight,
     /// And of what, unless that has changed.
     seen: Option<(Seen, Arc<shell::Shell>)>,
+}
+
+/// In which order each ray meets the tetrahedra.
+enum Sight {
+    /// All rays in one.
+    Sorted(Sorted),
+    /// Each by itself, from where it enters.
+    Walked(Entries),
 }
 
 /// A device without a scene.
@@ -103,13 +116,13 @@ impl super::Opened for Opened {
         let volume = Texture3d::upload(&gpu, "the volume", &scene.volume)?;
         let lit = scene.shading.as_ref().map(|shading| Lit::new(&gpu, &scene.shell, shading)).transpose()?;
         let solids = Solids::new(&gpu, &scene.solids)?;
-        let sorter = Sorter::new(&scene.shell.topology);
         Ok(Box::new(Shell {
             scene,
             gpu,
             progress,
             interrupt,
-            sorter,
+            sorter: None,
+            ways: None,
             volume,
             lit,
             shadows: None,
@@ -122,7 +135,25 @@ impl super::Opened for Opened {
     }
 }
 
+/// Those of a shell: kept, unless they are another topology's.
+fn ways<'a>(kept: &'a mut Option<Ways>, shell: &shell::Shell) -> &'a mut Ways {
+    let kept_ways = kept.take().filter(|ways| ways.are_of(shell));
+    kept.insert(kept_ways.unwrap_or_else(|| Ways::new(&shell.topology)))
+}
+
+/// As [`ways`].
+fn sorter<'a>(kept: &'a mut Option<(Arc<Topology>, Sorter)>, shell: &shell::Shell) -> &'a Sorter {
+    let kept_sorter = kept.take().filter(|(topology, _)| Arc::ptr_eq(topology, &shell.topology));
+    let new = || (shell.topology.clone(), Sorter::new(&shell.topology));
+    &kept.insert(kept_sorter.unwrap_or_else(new)).1
+}
+
 impl Shell {
+    /// Whether rays walk; else tetrahedra are sorted.
+    fn walks(&self) -> bool {
+        self.scene.traversal == Traversal::Walk && matches!(self.scene.march, March::Default { .. })
+    }
+
     /// Where a light casts any.
     fn shadows(&self) -> Option<&Shadows> {
         self.shadows.iter().flatten().next()
@@ -137,20 +168,31 @@ impl Method for Shell {
             |last: &Last| last.view == *view && Arc::ptr_eq(&last.vertices, &self.scene.shell.vertices);
         let mut kept = std::mem::take(&mut self.kept);
         let mut spare = None;
-        let (sorted, seen) = match self.last.take() {
+        let (sight, seen) = match self.last.take() {
             Some(last) if is_same_sight(&last) => {
                 kept.push("the order is kept: neither the geometry nor the camera has moved".into());
-                (last.sorted, last.seen)
+                (last.sight, last.seen)
             }
             last => {
                 spare = last.and_then(|last| last.seen);
-                self.progress.stage("sorting the tetrahedra");
-                let sorted = self.sorter.sort(&self.scene.shell, view);
+                let sight = match self.walks() {
+                    true => {
+                        self.progress.stage("finding where rays enter");
+                        let ways = ways(&mut self.ways, &self.scene.shell);
+                        Sight::Walked(Entries::new(ways.faces(), &self.scene.shell, view))
+                    }
+                    false => {
+                        self.progress.stage("sorting the tetrahedra");
+                        Sight::Sorted(sorter(&mut self.sorter, &self.scene.shell).sort(&self.scene.shell, view))
+                    }
+                };
                 watch.lap("order");
-                watch.add("order.relations", sorted.times.relations);
-                watch.add("order.abuffer", sorted.times.abuffer);
-                watch.add("order.search", sorted.times.search);
-                (sorted, None)
+                if let Sight::Sorted(sorted) = &sight {
+                    watch.add("order.relations", sorted.times.relations);
+                    watch.add("order.abuffer", sorted.times.abuffer);
+                    watch.add("order.search", sorted.times.search);
+                }
+                (sight, None)
             }
         };
 
@@ -162,7 +204,11 @@ impl Method for Shell {
             seen => {
                 self.progress.stage("mapping the view");
                 let spare = seen.or(spare).map(|(seen, _)| seen);
-                let seen = Seen::new(&self.scene, &sorted, view, self.gpu.subpixels(), spare);
+                let subpixels = self.gpu.subpixels();
+                let seen = match &sight {
+                    Sight::Sorted(sorted) => Seen::new(&self.scene, sorted, view, subpixels, spare),
+                    Sight::Walked(_) => Seen::all(&self.scene, view, subpixels, spare),
+                };
                 watch.lap("see");
                 seen
             }
@@ -177,9 +223,12 @@ impl Method for Shell {
             self.shadows = Some(shadows);
         }
         self.progress.stage("uploading the view");
-        let kind = self.kind(&seen, view);
+        if let Sight::Walked(_) = &sight {
+            ways(&mut self.ways, &self.scene.shell).place(&self.gpu, &self.scene.shell)?;
+        }
+        let kind = self.kind(&sight, &seen, view);
         let canvas = self.canvas.take();
-        let canvas = self.canvas(canvas, kind, &seen, view, is_uploaded)?;
+        let canvas = self.canvas(canvas, kind, &sight, &seen, view, is_uploaded)?;
         self.canvas = Some(canvas);
         let canvas = self.canvas.as_ref().expect("put there just now");
         watch.lap("upload");
@@ -209,7 +258,7 @@ impl Method for Shell {
         let mut textures = vec![(8, Sampled::Texture(&self.volume))];
         textures.extend(self.lit.as_ref().map(|lit| (9, Sampled::Texture(&lit.directions))));
         textures.extend(shadow_textures);
-        let mut batches: Vec<Batch<'_>> = seen.runs.iter().map(|run| canvas.batch(run)).collect();
+        let mut batches = canvas.batches(&seen);
         if let Some((solids, layer)) = &canvas.solids {
             textures.extend(solids.textures());
             batches.push(Batch { pipeline: layer, vertices: 0..3 });
@@ -217,7 +266,7 @@ impl Method for Shell {
         let times = draw(&Draw {
             target: &canvas.target,
             clears: true,
-            buffers: &canvas.buffers(self.lit.as_ref()),
+            buffers: &canvas.buffers(self.lit.as_ref(), self.ways.as_ref()),
             textures: &textures,
             push_constants: bytemuck::bytes_of(&constants),
             batches: &batches,
@@ -241,7 +290,7 @@ impl Method for Shell {
         });
         watch.lap("read");
         let left = left::fill(
-            &seen,
+            matches!(sight, Sight::Sorted(_)).then_some(&seen),
             &self.scene,
             view,
             &mut rgba,
@@ -253,7 +302,7 @@ impl Method for Shell {
         if shadows.is_some() {
             check_shadows(&rgba)?;
         }
-        let mut report = self.report(&sorted, &seen, &rgba);
+        let mut report = self.report(&sight, &seen, &rgba);
         report.skipped.extend(kept);
         if keeps_shadows && shadows.is_some() {
             report.skipped.push("shadows are kept: they do not depend on the camera".into());
@@ -261,7 +310,7 @@ impl Method for Shell {
         report.counts.insert("pixels_left_to_host".to_owned(), left);
         report.stages = watch.finish();
         let (vertices, shell) = (self.scene.shell.vertices.clone(), self.scene.shell.clone());
-        self.last = Some(Last { view: *view, vertices, sorted, seen: Some((seen, shell)) });
+        self.last = Some(Last { view: *view, vertices, sight, seen: Some((seen, shell)) });
         Ok(Frame { image: Image { width: view.width, height: view.height, rgba }, depth, report })
     }
 

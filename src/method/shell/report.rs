@@ -1,25 +1,33 @@
 //! The report of a frame: what it counted, what it skipped and why, and what the user should know.
 
-use super::Shell;
 use super::constants::{MOST_SAMPLES, wanted_samples};
 use super::seen::Seen;
+use super::{Shell, Sight};
 use crate::frame::Report;
-use crate::order::Sorted;
 use crate::shell::Limit;
 
 impl Shell {
     /// Without stages, and without what was kept of the frame before.
-    pub(super) fn report(&self, sorted: &Sorted, seen: &Seen, rgba: &[[f32; 4]]) -> Report {
+    pub(super) fn report(&self, sight: &Sight, seen: &Seen, rgba: &[[f32; 4]]) -> Report {
         let health = self.scene.shell.health;
         let mut report =
             Report { method: "shell".into(), device: self.gpu.info().name.clone(), ..Report::default() };
         let mut count = |name: &str, value: u64| report.counts.insert(name.to_owned(), value);
         count("tetrahedra", health.tetrahedra);
         count("tetrahedra_drawn", seen.count);
-        count("face_relations", sorted.face_relations);
-        count("image_relations", sorted.image_relations);
-        count("cycles", sorted.order.cycles.len() as u64);
-        count("tetrahedra_in_cycles", sorted.cycle_members);
+        match sight {
+            Sight::Sorted(sorted) => {
+                count("face_relations", sorted.face_relations);
+                count("image_relations", sorted.image_relations);
+                count("cycles", sorted.order.cycles.len() as u64);
+                count("tetrahedra_in_cycles", sorted.cycle_members);
+            }
+            Sight::Walked(entries) => {
+                count("entries", entries.places.len() as u64);
+                count("pixels_begun_inside", entries.begun_inside);
+                count("pixels_overlapping", entries.overlapping);
+            }
+        }
         count("pixels_covered", rgba.iter().filter(|pixel| pixel[3] > 0.0).count() as u64);
         let triangles = self.scene.solids.iter().map(|solid| solid.mesh.triangles.len() as u64).sum::<u64>();
         if triangles > 0 {
@@ -37,10 +45,14 @@ impl Shell {
         if health.zero_volume > 0 {
             report.skipped.push(format!("{} tetrahedra have no volume", health.zero_volume));
         }
-        if sorted.order.cycles.is_empty() {
-            report
+        match sight {
+            Sight::Sorted(sorted) if sorted.order.cycles.is_empty() => report
                 .skipped
-                .push("no tetrahedra hide one another in a cycle: nothing is resolved per pixel".into());
+                .push("no tetrahedra hide one another in a cycle: nothing is resolved per pixel".into()),
+            Sight::Sorted(_) => {}
+            Sight::Walked(_) => {
+                report.skipped.push("each ray walks from tetrahedron to tetrahedron: nothing is sorted".into());
+            }
         }
         if !seen.minified {
             report.skipped.push("all is magnified: no level of detail but 0 is compiled in".into());

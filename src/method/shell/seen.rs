@@ -63,7 +63,7 @@ pub enum Run {
 /// All that can be seen, and what cannot.
 #[derive(Debug, Clone, Default)]
 pub struct Seen {
-    /// One a tetrahedron; of those that are not in `list`, anything.
+    /// One a tetrahedron; of those that cannot be seen, anything.
     pub cells: Vec<Cell>,
     /// Tetrahedra, by run, front to back; those of a cycle by tile, nearest first.
     pub list: Vec<u32>,
@@ -88,11 +88,7 @@ impl Seen {
     /// a pixel. `spare`, which is no longer needed, may lend its memory.
     pub fn new(scene: &Scene, sorted: &Sorted, view: &View, subpixels: u32, spare: Option<Self>) -> Self {
         let eye = Eye::new(scene, view, subpixels);
-        let mut seen = Self { unit: eye.unit, ..Self::default() };
-        if let Some(spare) = spare {
-            (seen.cells, seen.list) = (spare.cells, spare.list);
-            seen.list.clear();
-        }
+        let mut seen = Self::begun(&eye, spare);
         // In the order of the tetrahedra, since that is how all that is read and written here lies in memory.
         seen.cells.resize(scene.shell.topology.tetrahedra.len(), Cell::zeroed());
         let cells = seen.cells.par_iter_mut().zip(&sorted.exit_faces).enumerate().with_min_len(TASK);
@@ -107,6 +103,33 @@ impl Seen {
             done = cycle.end;
         }
         seen.add_sorted(&sequence[done..], &found);
+        seen
+    }
+
+    /// Maps all tetrahedra of `scene` that have a volume, for rays that walk among them. `spare` as above.
+    pub fn all(scene: &Scene, view: &View, subpixels: u32, spare: Option<Self>) -> Self {
+        let eye = Eye::new(scene, view, subpixels);
+        let mut seen = Self::begun(&eye, spare);
+        seen.cells.resize(scene.shell.topology.tetrahedra.len(), Cell::zeroed());
+        let cells = seen.cells.par_iter_mut().enumerate().with_min_len(TASK);
+        let mapped = cells.map(|(t, cell)| {
+            if !scene.shell.has_maps(t) {
+                *cell = Cell::zeroed(); // a ray that comes here ends
+                return (0, false);
+            }
+            let vertices = eye.vertices(t);
+            (1, eye.fill(t, &vertices.map(|vertex| vertex.position), cell))
+        });
+        (seen.count, seen.minified) = mapped.reduce(|| (0, false), |a, b| (a.0 + b.0, a.1 | b.1));
+        seen
+    }
+
+    fn begun(eye: &Eye<'_>, spare: Option<Self>) -> Self {
+        let mut seen = Self { unit: eye.unit, ..Self::default() };
+        if let Some(spare) = spare {
+            (seen.cells, seen.list) = (spare.cells, spare.list);
+            seen.list.clear();
+        }
         seen
     }
 
@@ -255,9 +278,7 @@ impl<'a> Eye<'a> {
 
     /// Fills in the cell of a tetrahedron, where it is seen.
     fn map(&self, t: usize, exit_faces: u8, cell: &mut Cell) -> Found {
-        let shell = &self.scene.shell;
-        let determinant = shell.determinants[t];
-        if exit_faces == 0 || determinant == 0.0 {
+        if exit_faces == 0 || !self.scene.shell.has_maps(t) {
             return Found::WithoutVolume;
         }
         let vertices = self.vertices(t);
@@ -270,7 +291,13 @@ impl<'a> Eye<'a> {
         let clip = |corner: DVec2| (corner - self.projection.centre) / self.projection.centre;
         let [a, b, c, d] = outline.map(|corner| clip(corner).as_vec2());
         cell.outline = [[a.x, a.y, b.x, b.y], [c.x, c.y, d.x, d.y]];
+        Found::Seen { minified: self.fill(t, &positions, cell) }
+    }
 
+    /// Fills in planes and texture of a tetrahedron that has a volume; returns whether more than level 0 can be needed in it.
+    fn fill(&self, t: usize, positions: &[DVec3; 4], cell: &mut Cell) -> bool {
+        let shell = &self.scene.shell;
+        let determinant = shell.determinants[t];
         // Both cells at a face go round it from the same corner, one of them the other way: its area vector is the same in both to
         // the bit, up to its sign. It points outwards in the world where the volume is positive; view space is its mirror image.
         let [origin, corners @ ..] = shell.vertices_of(t);
@@ -303,6 +330,6 @@ impl<'a> Eye<'a> {
         let texels_per_unit =
             (0..3).map(|i| rows[i].length_squared() * f64::from(size[i]).powi(2)).fold(0.0, f64::max).sqrt();
         let footprint = self.scene.medium.lod_footprint * self.projection.pixel * farthest;
-        Found::Seen { minified: footprint * texels_per_unit > 1.0 }
+        footprint * texels_per_unit > 1.0
     }
 }

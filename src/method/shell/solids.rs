@@ -90,6 +90,7 @@ impl SolidView {
                 (true, false) => &[5, 7],
                 (true, true) => &shadowed,
             },
+            texel_buffers: &[],
             textures: if on.contains(&"SHADOWS") { &textures } else { &textures[5..] },
             push_constant_bytes: size_of::<ViewConstants>() as u32,
             keeps: Keeps::Nearest,

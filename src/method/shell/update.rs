@@ -7,7 +7,6 @@ use super::solids::{self, Solids};
 use super::{Shell, longest_span};
 use crate::Result;
 use crate::gpu::Texture3d;
-use crate::order::Sorter;
 use crate::scene::Scene;
 
 impl Shell {
@@ -73,7 +72,6 @@ impl Shell {
         }
         let same_topology = Arc::ptr_eq(&before.shell.topology, &scene.shell.topology);
         if !same_topology {
-            self.sorter = Sorter::new(&scene.shell.topology);
             self.last = None;
         }
         if same_shell {
@@ -84,6 +82,7 @@ impl Shell {
         if let Some(last) = &mut self.last
             && (model(before) != model(&scene)
                 || before.medium.lod_footprint != scene.medium.lod_footprint
+                || before.traversal != scene.traversal
                 || size != before.volume.levels[0].size
                 || scene.volume.levels.len() != before.volume.levels.len())
         {

@@ -1,0 +1,70 @@
+#version 450
+#extension GL_ARB_shading_language_include : require
+// switches: DEPTH SOLIDS LIT SHADOWS(LIT)
+// Walks the ray of each pixel through the shell, front to back, from every place where it enters. A pixel that is too much for
+// that is left to the host: it becomes infinite.
+
+#include "shell.glsl"
+#include "medium.glsl"
+#include "ray.glsl"
+#include "sample.glsl"
+#include "march.glsl"
+#include "solids.glsl"
+#include "walk.glsl"
+
+layout(location = 0) out vec4 out_rgba; // premultiplied
+#ifdef DEPTH
+layout(location = 1) out vec4 out_depth; // (distance * alpha, 0, 0, alpha)
+#endif
+
+// Where less is let through the rest is not looked at.
+const float SATURATED = 9.5367431640625e-7; // 2^-20
+
+// Passes through loops after which a pixel is left to the host. lavapipe runs eight pixels at once, all of them as often as the
+// one that needs it most, and ends all loops after 65,535 passes.
+const uint MOST_PASSES = 8000;
+
+void main() {
+    int pixel = int(gl_FragCoord.y) * int(2.0 * view.centre.x) + int(gl_FragCoord.x);
+    int next = int(texelFetch(firsts, pixel).x);
+    int last = int(texelFetch(firsts, pixel + 1).x);
+    if (next == last) discard;
+    vec3 ray = pixel_ray();
+    float per_depth = length(ray) * view.per_opacity_distance;
+#ifdef SOLIDS
+    float farthest = solid_depth();
+#else
+    float farthest = FAR;
+#endif
+    Light light = Light(Gathered(vec4(0.0), vec4(0.0)), 0.0);
+    uint place = NOWHERE;
+    float from = view.near;
+    uint passes = 0;
+    while (passes < MOST_PASSES) {
+        if (place == NOWHERE) {
+            if (next == last || transmittance(light.gathered) <= SATURATED) break;
+            place = texelFetch(entries, next++).x;
+            from = max(from, depth_at(place, ray));
+        }
+        float depth;
+        uint exit = exit_of(place, ray, depth);
+        vec2 segment = vec2(from, min(depth, farthest));
+        passes++;
+        if (exit != NOWHERE && segment.y > segment.x) {
+            vec4 rows[3];
+            texture_of(place >> 2, rows);
+            Path path = path_in(rows, ray);
+            uint samples = sample_count(path, segment.x, segment.y);
+            passes += samples;
+            march_midpoints(path, segment, per_depth, samples, light);
+            from = segment.y;
+        }
+        place = exit == NOWHERE || depth >= farthest || transmittance(light.gathered) <= SATURATED
+            ? NOWHERE : texelFetch(beyond, int(exit)).x;
+        if (depth >= farthest) break;
+    }
+    out_rgba = passes < MOST_PASSES ? light.gathered.rgba : vec4(uintBitsToFloat(0x7f800000u));
+#ifdef DEPTH
+    out_depth = vec4(light.depth * length(ray), 0.0, 0.0, light.gathered.rgba.a);
+#endif
+}

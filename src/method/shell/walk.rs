@@ -1,0 +1,100 @@
+//! What rays need that walk by adjacency (`glsl/walk.frag.glsl`): where they enter the shell, and what lies beyond each face.
+
+use std::sync::Arc;
+
+use crate::Result;
+use crate::gpu::{Buffer, Gpu};
+use crate::order::Entries;
+use crate::order::relations::FaceTable;
+use crate::shell::{Shell, Topology};
+
+/// The side of the squares in which the picture is drawn, in pixels: `SIDE` of `glsl/walk.vert.glsl`.
+const SIDE: u32 = 64;
+
+/// A shell's faces.
+pub struct Ways {
+    topology: Arc<Topology>,
+    faces: FaceTable,
+    /// What lies beyond each face, and whether every tetrahedron had a positive volume then.
+    beyond: Option<(Buffer, bool)>,
+}
+
+impl Ways {
+    /// Lists the faces of `topology`.
+    pub fn new(topology: &Arc<Topology>) -> Self {
+        Self { topology: topology.clone(), faces: FaceTable::new(topology), beyond: None }
+    }
+
+    /// Whether they are those of this shell.
+    pub fn are_of(&self, shell: &Shell) -> bool {
+        Arc::ptr_eq(&self.topology, &shell.topology)
+    }
+
+    /// Lists of faces, for the A-buffer.
+    pub fn faces(&self) -> &FaceTable {
+        &self.faces
+    }
+
+    /// Uploads what lies beyond the faces of a shell of this topology, unless that is the same as before.
+    ///
+    /// # Errors
+    /// As [`Buffer::numbers`].
+    pub fn place(&mut self, gpu: &Arc<Gpu>, shell: &Shell) -> Result<()> {
+        let is_sound = shell.health.inverted == 0 && shell.health.zero_volume == 0;
+        match &mut self.beyond {
+            Some((_, true)) if is_sound => {}
+            Some((buffer, was_sound)) => {
+                buffer.refill(&self.faces.beyond(&shell.determinants))?;
+                *was_sound = is_sound;
+            }
+            None => {
+                let beyond = self.faces.beyond(&shell.determinants);
+                self.beyond = Some((Buffer::numbers(gpu, "what lies beyond each face", &beyond)?, is_sound));
+            }
+        }
+        Ok(())
+    }
+
+    /// What was uploaded.
+    pub fn beyond(&self) -> &Buffer {
+        &self.beyond.as_ref().expect("the shell has been placed").0
+    }
+}
+
+/// Where rays enter, on the device.
+pub struct Starts {
+    first: Buffer,
+    places: Buffer,
+}
+
+impl Starts {
+    /// Uploads them.
+    ///
+    /// # Errors
+    /// As [`Buffer::numbers`].
+    pub fn new(gpu: &Arc<Gpu>, entries: &Entries) -> Result<Self> {
+        Ok(Self {
+            first: Buffer::numbers(gpu, "the pixels' entries", &entries.first)?,
+            places: Buffer::numbers(gpu, "where rays enter", &entries.places)?,
+        })
+    }
+
+    /// The same into the buffers that there are.
+    ///
+    /// # Errors
+    /// As [`Buffer::numbers`].
+    pub fn refill(&mut self, entries: &Entries) -> Result<()> {
+        self.first.refill(&entries.first)?;
+        self.places.refill(&entries.places)
+    }
+
+    /// By the binding that shaders name.
+    pub fn buffers(&self) -> [(u32, &Buffer); 2] {
+        [(20, &self.first), (21, &self.places)]
+    }
+}
+
+/// How many vertices draw a picture of this size.
+pub fn vertices([width, height]: [u32; 2]) -> u32 {
+    6 * width.div_ceil(SIDE) * height.div_ceil(SIDE)
+}
