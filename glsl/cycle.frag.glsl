@@ -13,6 +13,7 @@
 #include "march.glsl"
 #include "solids.glsl"
 #include "gather.glsl"
+#include "add.glsl"
 
 layout(location = 0) out vec4 out_rgba; // premultiplied
 #ifdef DEPTH
@@ -56,31 +57,19 @@ void main() {
             float step = (next - z) / float(samples); // in a gap there are no samples
             for (uint i = 0; i < samples; i++) {
                 float at = z + (float(i) + 0.5) * step;
-                float depth = 0.0;
-                vec3 emission = vec3(0.0); // sum of straight colour times optical depth
-                uint walls = 0;
-                vec3 wall = vec3(0.0);
+                Sum sum = nothing();
                 for (uint hit = first; hit < end; hit++) {
                     if (spans[hit].y <= z) continue;
 #ifdef LIT
                     enter(hits[hit], cells[hits[hit]].planes, ray);
 #endif
-                    vec4 texel = radiant(path_in(cells[hits[hit]].texture, ray), at);
-                    if (!EXTINCTION && texel.a >= 1.0) {
-                        walls++;
-                        wall += texel.rgb;
-                    } else if (texel.a > LEAST) {
-                        float one = extinction(texel) * max(step * per_depth, LEAST);
-                        depth += one;
-                        emission += emitted(texel, one);
-                    }
+                    add(sum, radiant(path_in(cells[hits[hit]].texture, ray), at), step * per_depth);
                 }
-                float alpha = walls > 0 ? 1.0 : opacity(depth);
-                vec3 colour = walls > 0 ? wall / float(walls) : depth > LEAST ? emission * (alpha / depth) : vec3(0.0);
+                vec4 mixed = mixture(sum);
 #ifdef DEPTH
-                mean_distance += transmittance(gathered) * alpha * at * length(ray);
+                mean_distance += transmittance(gathered) * mixed.a * at * length(ray);
 #endif
-                lay_behind(gathered, vec4(colour, alpha));
+                lay_behind(gathered, mixed);
             }
             z = next;
         }

@@ -17,18 +17,11 @@ layout(location = 0) out vec4 out_rgba; // premultiplied
 layout(location = 1) out vec4 out_depth; // (distance * alpha, 0, 0, alpha)
 #endif
 
-// Where less is let through the rest is not looked at.
-const float SATURATED = 9.5367431640625e-7; // 2^-20
-
-// Passes through loops after which a pixel is left to the host. lavapipe runs eight pixels at once, all of them as often as the
-// one that needs it most, and ends all loops after 65,535 passes.
-const uint MOST_PASSES = 8000;
-
 void main() {
-    int pixel = int(gl_FragCoord.y) * int(2.0 * view.centre.x) + int(gl_FragCoord.x);
-    int next = int(texelFetch(firsts, pixel).x);
-    int last = int(texelFetch(firsts, pixel + 1).x);
-    if (next == last) discard;
+    int next;
+    int last;
+    bool is_intricate = entries_of_pixel(next, last);
+    if (next == last || is_intricate) discard;
     vec3 ray = pixel_ray();
     float per_depth = length(ray) * view.per_opacity_distance;
 #ifdef SOLIDS
@@ -40,6 +33,13 @@ void main() {
     uint place = NOWHERE;
     float from = view.near;
     uint passes = 0;
+    if (INSIDE) {
+        uint entry = texelFetch(entries, next).x;
+        if ((entry & LEAVES) != 0) {
+            next++;
+            place = back_to_start(entry & ~LEAVES, ray, passes);
+        }
+    }
     while (passes < MOST_PASSES) {
         if (place == NOWHERE) {
             if (next == last || transmittance(light.gathered) <= SATURATED) break;
@@ -56,6 +56,11 @@ void main() {
             Path path = path_in(rows, ray);
             uint samples = sample_count(path, segment.x, segment.y);
             passes += samples;
+#ifdef LIT
+            vec4 planes[4];
+            planes_of(place >> 2, planes);
+            enter(place >> 2, planes, ray);
+#endif
             march_midpoints(path, segment, per_depth, samples, light);
             from = segment.y;
         }

@@ -96,14 +96,9 @@ fn shadowed() -> Vec<Spirv> {
 
 #[test]
 fn structs_of_lit_scenes_agree() {
+    // Of two and three texels: `frame.glsl`.
+    assert_eq!((size_of::<LitCell>(), size_of::<Frame>()), (2 * 16, 3 * 16));
     for shader in of_the_shell(true) {
-        let (members, stride) = layout(shader, "LitCell");
-        assert_eq!(
-            (members, stride),
-            (host!(LitCell: frames, per_height), Some(size_of::<LitCell>() as u32))
-        );
-        let (members, stride) = layout(shader, "Frame");
-        assert_eq!((members, stride), (host!(Frame: columns), Some(size_of::<Frame>() as u32)));
         let (members, stride) = layout(shader, "LightSource");
         assert_eq!(
             (members, stride),

@@ -1,6 +1,8 @@
 // From tetrahedron to tetrahedron along a ray (M. Garrity, Raytracing irregular volume data, 1990): out of each by the face
 // that the ray meets first, into the neighbour there. What is fetched is small and far apart, for which texels are made.
 
+layout(constant_id = 5) const bool INSIDE = false; // whether rays begin in the shell
+
 layout(set = 0, binding = 18) uniform samplerBuffer cells;    // of src/method/shell/seen.rs, nine texels each
 layout(set = 0, binding = 19) uniform usamplerBuffer beyond;  // four a tetrahedron: the place beyond each face, or NOWHERE
 layout(set = 0, binding = 20) uniform usamplerBuffer firsts;  // of each pixel, row by row, in `entries`; and after the last
@@ -10,6 +12,15 @@ layout(set = 0, binding = 21) uniform usamplerBuffer entries; // places where ra
 const uint NOWHERE = 0xffffffffu;
 // In `entries`: the ray may have begun in the shell; here it leaves it.
 const uint LEAVES = 0x80000000u;
+// In `firsts`: the ray is in two parts of the shell at once.
+const uint INTRICATE = 0x80000000u;
+
+// Where less is let through the rest is not looked at.
+const float SATURATED = 9.5367431640625e-7; // 2^-20
+
+// Passes through loops after which a pixel is left to the host. lavapipe runs eight pixels at once, all of them as often as the
+// one that needs it most, and ends all loops after 65,535 passes.
+const uint MOST_PASSES = 8000;
 
 const float FAR = 3.0e38;
 
@@ -19,6 +30,19 @@ vec4 plane_at(uint place) {
 
 void texture_of(uint cell, out vec4 rows[3]) {
     for (int i = 0; i < 3; i++) rows[i] = texelFetch(cells, int(cell * 9) + 6 + i);
+}
+
+void planes_of(uint cell, out vec4 planes[4]) {
+    for (int i = 0; i < 4; i++) planes[i] = texelFetch(cells, int(cell * 9) + 2 + i);
+}
+
+// The entries of this pixel, from `next` to before `last`; whether they are of an intricate ray.
+bool entries_of_pixel(out int next, out int last) {
+    int pixel = int(gl_FragCoord.y) * int(2.0 * view.centre.x) + int(gl_FragCoord.x);
+    uint begin = texelFetch(firsts, pixel).x;
+    next = int(begin & ~INTRICATE);
+    last = int(texelFetch(firsts, pixel + 1).x & ~INTRICATE);
+    return (begin & INTRICATE) != 0;
 }
 
 float depth_at(uint place, vec3 ray) {
@@ -42,4 +66,33 @@ uint exit_of(uint place, vec3 ray, out float depth) {
         }
     }
     return exit;
+}
+
+// As `exit_of`, of a ray that leaves the tetrahedron at `place`: where it has entered it.
+uint entry_of(uint place, vec3 ray, out float depth) {
+    uint entry = NOWHERE;
+    depth = -FAR;
+    for (uint i = 1; i < 4; i++) {
+        uint other = (place & ~3u) | ((place + i) & 3);
+        vec4 plane = plane_at(other);
+        float towards_inside = dot(plane.xyz, ray);
+        float at = plane.w / towards_inside;
+        if (towards_inside > 0.0 && at > depth) {
+            depth = at;
+            entry = other;
+        }
+    }
+    return entry;
+}
+
+// From where a ray leaves the shell back to where it begins in it, before the near plane; NOWHERE if it begins outside.
+uint back_to_start(uint place, vec3 ray, inout uint passes) {
+    float depth = 0.0;
+    do {
+        passes++;
+        place = entry_of(place, ray, depth);
+        if (place == NOWHERE || depth <= view.near) break;
+        place = texelFetch(beyond, int(place)).x;
+    } while (place != NOWHERE && passes < MOST_PASSES);
+    return place;
 }

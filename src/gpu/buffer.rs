@@ -83,12 +83,24 @@ impl Buffer {
 
     /// A buffer that the device copies from.
     pub(super) fn staging(gpu: &Arc<Gpu>, name: &'static str, bytes: u64) -> Result<Self> {
-        Self::new(gpu, name, bytes, Kind::Transfer(vk::BufferUsageFlags::TRANSFER_SRC), MemoryLocation::CpuToGpu)
+        Self::new(
+            gpu,
+            name,
+            bytes,
+            Kind::Transfer(vk::BufferUsageFlags::TRANSFER_SRC),
+            MemoryLocation::CpuToGpu,
+        )
     }
 
     /// A buffer that the device copies to.
     pub(super) fn readback(gpu: &Arc<Gpu>, name: &'static str, bytes: u64) -> Result<Self> {
-        Self::new(gpu, name, bytes, Kind::Transfer(vk::BufferUsageFlags::TRANSFER_DST), MemoryLocation::GpuToCpu)
+        Self::new(
+            gpu,
+            name,
+            bytes,
+            Kind::Transfer(vk::BufferUsageFlags::TRANSFER_DST),
+            MemoryLocation::GpuToCpu,
+        )
     }
 
     fn new(

@@ -182,11 +182,7 @@ impl Pipeline {
                 vk::DescriptorType::STORAGE_BUFFER,
                 vk::ShaderStageFlags::VERTEX | vk::ShaderStageFlags::FRAGMENT,
             ),
-            (
-                &self.texel_buffers,
-                vk::DescriptorType::UNIFORM_TEXEL_BUFFER,
-                vk::ShaderStageFlags::FRAGMENT,
-            ),
+            (&self.texel_buffers, vk::DescriptorType::UNIFORM_TEXEL_BUFFER, vk::ShaderStageFlags::FRAGMENT),
             (&self.textures, vk::DescriptorType::COMBINED_IMAGE_SAMPLER, vk::ShaderStageFlags::FRAGMENT),
         ];
         for (numbers, kind, stages) in kinds {

@@ -368,12 +368,7 @@ impl Default for ImageSection {
 
 impl Default for MarchSection {
     fn default() -> Self {
-        Self {
-            plan: Plan::Default,
-            step: Step(0.5),
-            samples: Samples(10),
-            traversal: Traversal::default(),
-        }
+        Self { plan: Plan::Default, step: Step(0.5), samples: Samples(10), traversal: Traversal::default() }
     }
 }
 

@@ -10,7 +10,9 @@ mod solids;
 
 use glam::{DVec2, DVec3};
 use mesoshell::mesh::generate::{Generator, Plane, Torus};
-use mesoshell::scene::{Camera, Emission, Light, March, Medium, Model, Scene, Shading, Source, Traversal, View};
+use mesoshell::scene::{
+    Camera, Emission, Light, March, Medium, Model, Scene, Shading, Source, Traversal, View,
+};
 use mesoshell::shell::{Shell, ShellOptions};
 use mesoshell::volume::{Directions, Pyramid, Volume};
 use rand::{RngExt, SeedableRng};

@@ -33,13 +33,19 @@ enum Medium {
     },
     Walked {
         pipeline: Pipeline,
+        /// For rays that are in several parts of the shell at once, where there are any.
+        together: Option<Pipeline>,
         starts: Starts,
     },
 }
 
 impl Canvas {
     /// By the binding that shaders name.
-    pub(super) fn buffers<'a>(&'a self, lit: Option<&'a Lit>, ways: Option<&'a Ways>) -> Vec<(u32, &'a Buffer)> {
+    pub(super) fn buffers<'a>(
+        &'a self,
+        lit: Option<&'a Lit>,
+        ways: Option<&'a Ways>,
+    ) -> Vec<(u32, &'a Buffer)> {
         let mut buffers = Vec::new();
         match &self.medium {
             Medium::Sorted { tiles, list, .. } => buffers.extend([(0, &self.cells), (1, tiles), (2, list)]),
@@ -69,9 +75,10 @@ impl Canvas {
                 };
                 seen.runs.iter().map(batch).collect()
             }
-            Medium::Walked { pipeline, .. } => {
-                let vertices = walk::vertices([self.kind.width, self.kind.height]);
-                vec![Batch { pipeline, vertices: 0..vertices }]
+            Medium::Walked { pipeline, together, .. } => {
+                let vertices = 0..walk::vertices([self.kind.width, self.kind.height]);
+                let pipelines = [Some(pipeline), together.as_ref()].into_iter().flatten();
+                pipelines.map(|pipeline| Batch { pipeline, vertices: vertices.clone() }).collect()
             }
         }
     }
@@ -83,6 +90,7 @@ pub(super) struct CanvasKind {
     width: u32,
     height: u32,
     depth: bool,
+    /// Whether anything is resolved pixel by pixel.
     cycles: bool,
     walks: bool,
     /// What is compiled into the shaders: what the scene has, and what is asked for.
@@ -117,7 +125,8 @@ impl Shell {
                 (Medium::Walked { .. }, Sight::Sorted(_)) => unreachable!("a canvas of another kind"),
             }
         }
-        if let (Some(lit), Some(kept), Some(sight)) = (&self.lit, &mut canvas.lit, self.lit_sight(seen, view)) {
+        if let (Some(lit), Some(kept), Some(sight)) = (&self.lit, &mut canvas.lit, self.lit_sight(seen, view))
+        {
             kept.refill(lit, sight, !is_uploaded)?;
         }
         Ok(canvas)
@@ -137,14 +146,19 @@ impl Shell {
             ("SHADOWS", self.shadows().is_some()),
         ];
         let mut constants = constants_of_volume(self.scene.march, seen.minified, &self.scene.volume).to_vec();
-        if let Some(shading) = &self.scene.shading {
-            constants.extend([shading.model == Model::Fibre, shading.emission.glow > 0.0].map(u32::from));
-        }
+        let shading = self.scene.shading.as_ref();
+        let fibre = shading.is_some_and(|shading| shading.model == Model::Fibre);
+        let glow = shading.is_some_and(|shading| shading.emission.glow > 0.0);
+        let inside = matches!(sight, Sight::Walked(entries) if entries.begun_inside > 0);
+        constants.extend([fibre, glow, inside].map(u32::from));
         CanvasKind {
             width: view.width,
             height: view.height,
             depth: view.depth,
-            cycles: !seen.tiles.is_empty(),
+            cycles: match sight {
+                Sight::Sorted(_) => !seen.tiles.is_empty(),
+                Sight::Walked(entries) => entries.overlapping > 0,
+            },
             walks: matches!(sight, Sight::Walked(_)),
             switches: switches.into_iter().filter_map(|(name, is_on)| is_on.then_some(name)).collect(),
             constants,
@@ -155,15 +169,17 @@ impl Shell {
         let target = Target::new(&self.gpu, kind.width, kind.height, if kind.depth { 2 } else { 1 })?;
         let on = &kind.switches;
         let mut buffers = if kind.walks { Vec::new() } else { vec![0, 1, 2] };
+        let mut texel_buffers = if kind.walks { vec![18, 19, 20, 21] } else { Vec::new() };
         let mut textures = vec![8];
         for &switch in on {
-            let (more_buffers, more_textures): (&[u32], &[u32]) = match switch {
-                "LIT" => (&[3, 4, 5], &[9]),
-                "SHADOWS" => (&[6], &[10, 11, 12, 13]),
-                "SOLIDS" => (&[], &[15]),
-                _ => (&[], &[]),
+            let (more_buffers, more_texel_buffers, more_textures): (&[u32], &[u32], &[u32]) = match switch {
+                "LIT" => (&[5], &[3, 4], &[9]),
+                "SHADOWS" => (&[6], &[], &[10, 11, 12, 13]),
+                "SOLIDS" => (&[], &[], &[15]),
+                _ => (&[], &[], &[]),
             };
             buffers.extend(more_buffers);
+            texel_buffers.extend(more_texel_buffers);
             textures.extend(more_textures);
         }
         if on.contains(&"SHADOWS") && on.contains(&"SOLIDS") {
@@ -174,7 +190,7 @@ impl Shell {
             fragment: shaders::SHELL_FRAG.with(on),
             constants: &kind.constants,
             storage_buffers: &buffers,
-            texel_buffers: &[],
+            texel_buffers: &texel_buffers,
             textures: &textures,
             push_constant_bytes: size_of::<ViewConstants>() as u32,
             keeps: Keeps::Blend,
@@ -199,13 +215,15 @@ impl Shell {
                 let walked = PipelineInfo {
                     vertex: shaders::WALK_VERT.with(on),
                     fragment: shaders::WALK_FRAG.with(on),
-                    texel_buffers: &[18, 19, 20, 21],
                     ..info
                 };
                 let pipeline = Pipeline::new(&self.gpu, &target, &walked)?;
+                let of_several = PipelineInfo { fragment: shaders::TOGETHER_FRAG.with(on), ..walked };
+                let together = kind.cycles.then(|| Pipeline::new(&self.gpu, &target, &of_several));
+                let together = together.transpose()?;
                 let starts = Starts::new(&self.gpu, entries)?;
                 let cells = Buffer::floats(&self.gpu, "the tetrahedra", &seen.cells)?;
-                (cells, Medium::Walked { pipeline, starts })
+                (cells, Medium::Walked { pipeline, together, starts })
             }
         };
         let solids = self.solids.as_ref().map(|_| {
@@ -214,6 +232,7 @@ impl Shell {
                 fragment: shaders::LAYER_FRAG.with(on),
                 constants: &[],
                 storage_buffers: &[],
+                texel_buffers: &[],
                 textures: &[15, 16],
                 ..info
             };

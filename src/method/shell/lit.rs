@@ -13,7 +13,7 @@ use crate::gpu::{Buffer, Gpu, Texture3d};
 use crate::scene::{Light, Shading, Source, View};
 use crate::shell::{self, Shell};
 
-/// `Frame` of `glsl/include/frame.glsl`: see there for each member.
+/// A frame of `glsl/include/frame.glsl`: see there.
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
 #[allow(missing_docs, reason = "documented at the one declaration in glsl")]
@@ -21,7 +21,7 @@ pub struct Frame {
     pub columns: [[f32; 4]; 3],
 }
 
-/// `LitCell` of `glsl/include/frame.glsl`: see there for each member.
+/// What `glsl/include/frame.glsl` needs of a tetrahedron: see there.
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
 #[allow(missing_docs, reason = "documented at the one declaration in glsl")]
@@ -103,7 +103,7 @@ impl Lit {
     pub fn new(gpu: &Arc<Gpu>, shell: &Shell, shading: &Shading) -> Result<Self> {
         let directions = Texture3d::upload_directions(gpu, "the directions", &shading.directions)?;
         let (frames, of_vertices) = frames(shell, shading);
-        Ok(Self { directions, frames: Buffer::storage(gpu, "the shell's frames", &frames)?, of_vertices })
+        Ok(Self { directions, frames: Buffer::floats(gpu, "the shell's frames", &frames)?, of_vertices })
     }
 
     /// The same directions in another shell.
@@ -143,7 +143,7 @@ impl LitView {
         let pictures = sight.pictures();
         let pictures = pictures.map(|pictures| Buffer::storage(gpu, "the lights' pictures", &pictures));
         Ok(Self {
-            cells: Buffer::storage(gpu, "the tetrahedra's frames", &lit.cells(sight.shell, sight.seen))?,
+            cells: Buffer::floats(gpu, "the tetrahedra's frames", &lit.cells(sight.shell, sight.seen))?,
             lighting: Buffer::storage(gpu, "the lights", &sight.lighting())?,
             pictures: pictures.transpose()?,
         })

@@ -183,7 +183,9 @@ impl Method for Shell {
                     }
                     false => {
                         self.progress.stage("sorting the tetrahedra");
-                        Sight::Sorted(sorter(&mut self.sorter, &self.scene.shell).sort(&self.scene.shell, view))
+                        Sight::Sorted(
+                            sorter(&mut self.sorter, &self.scene.shell).sort(&self.scene.shell, view),
+                        )
                     }
                 };
                 watch.lap("order");

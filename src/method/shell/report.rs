@@ -51,7 +51,9 @@ impl Shell {
                 .push("no tetrahedra hide one another in a cycle: nothing is resolved per pixel".into()),
             Sight::Sorted(_) => {}
             Sight::Walked(_) => {
-                report.skipped.push("each ray walks from tetrahedron to tetrahedron: nothing is sorted".into());
+                report
+                    .skipped
+                    .push("each ray walks from tetrahedron to tetrahedron: nothing is sorted".into());
             }
         }
         if !seen.minified {
