@@ -140,18 +140,21 @@ pub struct MeshSection {
     pub file: Option<PathBuf>,
     /// How texture coordinates are made, in place of those of the file.
     pub projection: Option<Projection>,
-    /// Of a sequence of files: how many a second.
+    /// Of a glTF file: the name of an animation; by default the first.
+    pub clip: Option<Spanned<String>>,
+    /// Of a sequence of files: how many a second. Of a glTF file: how many seconds of the clip a second.
     pub rate: Option<Rate>,
-    /// Of a sequence of files: seconds after its first; by default the time of the frame.
+    /// Of a sequence of files: seconds after its first. Of a glTF file: seconds after the beginning of the clip. By default the time of the frame.
     pub time: Option<Finite>,
     /// Where it is.
     pub transform: Option<TransformSection>,
 }
 
 impl MeshSection {
-    /// The same, with what the mesh that is loaded does not depend on as if nothing were said of it; of a sequence, without when.
+    /// The same, with what the mesh that is loaded does not depend on as if nothing were said of it; of what moves by itself,
+    /// without when.
     pub(super) fn loaded(&self) -> Self {
-        Self { rate: None, time: None, transform: None, ..self.clone() }
+        Self { clip: None, rate: None, time: None, transform: None, ..self.clone() }
     }
 }
 
