@@ -105,7 +105,7 @@ impl<'a> MeshSource<'a> {
         let MeshSection { projection, clip, rate, time, .. } = section.get_ref();
         let gltf = meshes.gltf(path, projection.as_ref())?;
         let clips = gltf.clips();
-        let time = rate.map_or(1.0, |rate| rate.0) * time.map_or(moment.time, |time| time.0);
+        let at = rate.map_or(1.0, |rate| rate.0) * time.map_or(moment.time, |time| time.0);
         if let Some(clip) = clip {
             let index = clips.iter().position(|one| one.name == *clip.get_ref()).ok_or_else(|| {
                 let names: Vec<String> = clips.iter().map(|clip| format!("\"{}\"", clip.name)).collect();
@@ -113,7 +113,7 @@ impl<'a> MeshSource<'a> {
                 let message = format!("{} has no animation \"{}\"", path.display(), clip.get_ref());
                 text.error(clip.span(), message).with_help(format!("those that it has: {there_are}"))
             })?;
-            let pose = gltf.pose(index, time);
+            let pose = gltf.pose(index, at);
             return Ok(Self::Gltf(gltf, Some(pose)));
         }
         if clips.is_empty() && (rate.is_some() || time.is_some()) {
@@ -121,7 +121,7 @@ impl<'a> MeshSource<'a> {
             return Err(text.error(section.span(), message));
         }
         // The first, where there is one.
-        let pose = (!clips.is_empty()).then(|| gltf.pose(0, time));
+        let pose = (!clips.is_empty()).then(|| gltf.pose(0, at));
         Ok(Self::Gltf(gltf, pose))
     }
 
