@@ -17,8 +17,9 @@ use crate::{Error, Result, input};
 /// In bytes, of a file with all that it names.
 const LONGEST_FILE: u64 = 1 << 31;
 
-/// How many numbers are taken out of a file: 1 GiB. A short file can name the same bytes any number of times.
-const MOST_NUMBERS: u64 = 1 << 27;
+/// How many numbers are taken out of a file: those of some four million vertices with all that they can have. A short file can
+/// name the same bytes any number of times.
+const MOST_NUMBERS: u64 = 1 << 26;
 
 const MAGIC: &[u8] = b"glTF";
 
