@@ -487,6 +487,16 @@ recipe = "fog.toml"
             }
         }
         assert_eq!(found, 8 + 12 + 6 + 3 + 3 + 10 + 2 + 3);
+        let text = Text::new("keys", "[mesh]\nfile = \"a.glb\"\nunknown_key = 1".to_owned(), &[]).unwrap();
+        let message = text.parse::<SceneFile>(("mesh", "generator")).unwrap_err().to_string();
+        let (_, documented) = DOCUMENTATION.split_once("\n## `[mesh]`").unwrap();
+        let documented = documented.split("\n## ").next().unwrap();
+        let mesh: Vec<&str> =
+            message.split_once(", expected ").unwrap().1.split('`').skip(1).step_by(2).collect();
+        assert_eq!(mesh.len(), 7);
+        // The last is a section of its own.
+        assert!(mesh[..6].iter().all(|key| documented.contains(&format!("\n| `{key}` |"))), "{mesh:?}");
+        assert!(documented.contains(&format!("\n### `[mesh.{}]`", mesh[6])), "{mesh:?}");
         let wind = keys("shell.wind");
         assert_eq!(wind, ["direction", "strength", "gust", "size", "phase"]);
         let (_, documented) = DOCUMENTATION.split_once("\n### `[shell.wind]`").unwrap();
