@@ -2,6 +2,7 @@
 
 use std::f64::consts::{FRAC_1_SQRT_2, FRAC_PI_4, FRAC_PI_8};
 use std::path::{Path, PathBuf};
+use std::process::Command;
 use std::sync::Arc;
 
 use base64::Engine;
@@ -519,6 +520,24 @@ fn a_scene_plays_a_clip_and_keeps_its_topology() {
 }
 
 #[test]
+fn the_command_line_lists_joints_and_animations() {
+    let animation = Animation::new("file = \"arm.glb\"");
+    animation.write("arm.glb", &arm().binary());
+    let told = |more: &[&str]| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_mesoshell"));
+        command.arg("mesh").arg("info").arg(animation.path("arm.glb")).args(more);
+        String::from_utf8(command.output().unwrap().stdout).unwrap()
+    };
+    let json: Value = serde_json::from_str(&told(&["--json"])).unwrap();
+    let counts =
+        ["positions", "triangles", "vertices", "joints", "morph_targets"].map(|key| json[key].as_u64());
+    assert_eq!(counts, [6, 4, 6, 2, 0].map(Some));
+    assert_eq!(json["clips"], json!([{ "name": "bend", "duration": 2.0 }]));
+    let text = told(&[]);
+    assert!(text.contains("  joints ") && text.contains("bend, 2 s"), "{text}");
+}
+
+#[test]
 fn what_does_not_move_is_kept() {
     let animation = Animation::new("file = \"a.GLB\"");
     animation.write("a.GLB", &triangle(json!([{ "mesh": 0 }])).binary());
@@ -622,7 +641,7 @@ fn defects() -> Vec<(&'static str, Value, &'static str)> {
         ("/nodes/0/scale", json!([1e38, 1e38, 1e38]), "1e32"),
         ("/nodes/1/mesh", json!(1), "there is no mesh 1"),
         ("/nodes/1/skin", json!(1), "there is no skin 1"),
-        ("/nodes/1/weights", json!([1]), "[1.0] are no weights for 0 morph targets"),
+        ("/nodes/1/weights", json!([1]), "its 1 weights are not 0 finite numbers"),
         ("/skins/0/joints", json!([2]), "names the joint 1, but there are 1"),
         ("/skins/0/joints", json!([2, 3, 0]), "2 matrices for 3 joints"),
         ("/skins/0/joints", json!([2, 44]), "there is no node 44"),

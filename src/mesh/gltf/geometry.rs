@@ -24,9 +24,11 @@ pub(super) struct Bone {
 #[derive(Clone)]
 pub(super) struct Morphed {
     base: DVec3,
-    /// The weights that count, ascending, and what each adds where it is 1.
-    targets: Vec<(u32, DVec3)>,
+    targets: Targets,
 }
+
+/// The weights that count, ascending, and what each adds where it is 1.
+type Targets = Vec<(u32, DVec3)>;
 
 /// A vertex of the welded mesh.
 pub(super) struct Vertex {
@@ -148,15 +150,20 @@ impl Vertex {
 
     /// Where it is taken by matrices, one a bone.
     pub fn matrix(&self, bones: &[DAffine3]) -> DAffine3 {
-        let zero = DAffine3 { matrix3: DMat3::ZERO, translation: DVec3::ZERO };
-        self.bones.iter().fold(zero, |sum, &(bone, share)| {
-            let DAffine3 { matrix3, translation } = bones[bone as usize];
-            DAffine3 {
-                matrix3: sum.matrix3 + share * matrix3,
-                translation: sum.translation + share * translation,
-            }
-        })
+        mixed(&self.bones, bones)
     }
+}
+
+/// The sum of the bones' matrices, each times its share.
+fn mixed(shares: &[(u32, f64)], bones: &[DAffine3]) -> DAffine3 {
+    let zero = DAffine3 { matrix3: DMat3::ZERO, translation: DVec3::ZERO };
+    shares.iter().fold(zero, |sum, &(bone, share)| {
+        let DAffine3 { matrix3, translation } = bones[bone as usize];
+        DAffine3 {
+            matrix3: sum.matrix3 + share * matrix3,
+            translation: sum.translation + share * translation,
+        }
+    })
 }
 
 impl Builder<'_> {
@@ -195,19 +202,19 @@ impl Builder<'_> {
         let world_from_node = self.base.world_from_node[node];
         let mut mirrored = 0;
         for (id, mut position) in morphed(positions, position_targets).into_iter().enumerate() {
-            let vertex_bones = std::mem::take(&mut bones[id]);
             let mut normal = normals.next();
-            let mut mirrors = false;
-            if stands {
+            let bones = std::mem::take(&mut bones[id]);
+            let world_from_bind = if stands {
                 position
                     .map(|p| world_from_node.transform_point3(p), |d| world_from_node.transform_vector3(d));
                 let cofactor = cofactor(world_from_node.matrix3);
                 normal.iter_mut().for_each(|normal| normal.map(|n| cofactor * n, |d| cofactor * d));
-                mirrors = world_from_node.matrix3.determinant() < 0.0;
-            }
-            let vertex = Vertex { position, bones: vertex_bones };
-            mirrors ^= vertex.matrix(&self.world_from_bind).matrix3.determinant() < 0.0;
-            mirrored += usize::from(mirrors);
+                world_from_node
+            } else {
+                mixed(&bones, &self.world_from_bind)
+            };
+            mirrored += usize::from(world_from_bind.matrix3.determinant() < 0.0);
+            let vertex = Vertex { position, bones };
             let next = self.vertices.len() as u32;
             let vertices = &mut self.vertices;
             let vertex = *self.vertex_ids.entry(vertex.key()).or_insert_with(|| {
@@ -232,7 +239,7 @@ impl Builder<'_> {
                 .collect(),
             None => (first..first + count as u32).collect(),
         };
-        if mode == Mode::Triangles && corners.len() % 3 != 0 {
+        if mode == Mode::Triangles && !corners.len().is_multiple_of(3) {
             return Err(
                 document.error(format!("it has {} corners, which make no whole triangles", corners.len()))
             );
@@ -287,6 +294,7 @@ impl Builder<'_> {
     /// The bones of a skin's joints.
     fn joints(&mut self, skin: &Skin) -> Result<Vec<u32>> {
         let document = self.base.document;
+        document.spend(12 * skin.joints.len() as u64)?;
         let matrices = match skin.inverse_bind_matrices {
             Some(index) => document.numbers::<16>(index, None)?.into_iter().map(affine).collect(),
             None => vec![DAffine3::IDENTITY; skin.joints.len()],
@@ -317,17 +325,16 @@ impl Builder<'_> {
     }
 
     /// Of each vertex, what its morph targets add to its position, and to its normal unless that is unknown.
-    #[expect(clippy::type_complexity, reason = "two lists, that of `Morphed` for each vertex")]
     fn targets(
         &self,
         node: usize,
         primitive: &Primitive,
         count: usize,
-    ) -> Result<(Vec<Vec<(u32, DVec3)>>, Option<Vec<Vec<(u32, DVec3)>>>)> {
+    ) -> Result<(Vec<Targets>, Option<Vec<Targets>>)> {
         let document = self.base.document;
         let (mut positions, mut normals) = (vec![Vec::new(); count], vec![Vec::new(); count]);
         let mut has_normals = true;
-        let add = |index: Index<Accessor>, weight: usize, targets: &mut [Vec<(u32, DVec3)>]| -> Result<()> {
+        let add = |index: Index<Accessor>, weight: usize, targets: &mut [Targets]| -> Result<()> {
             for (targets, delta) in targets.iter_mut().zip(document.numbers::<3>(index, Some(count))?) {
                 if delta != [0.0; 3] {
                     targets.push((weight as u32, DVec3::from_array(delta)));
@@ -335,6 +342,7 @@ impl Builder<'_> {
             }
             Ok(())
         };
+        document.spend(primitive.targets.as_ref().map_or(0, Vec::len) as u64)?;
         let first = self.base.first_weights[node];
         for (weight, target) in (first..).zip(primitive.targets.iter().flatten()) {
             if let Some(index) = target.positions {
@@ -399,7 +407,7 @@ impl Builder<'_> {
     }
 }
 
-fn morphed(bases: Vec<[f64; 3]>, targets: Vec<Vec<(u32, DVec3)>>) -> Vec<Morphed> {
+fn morphed(bases: Vec<[f64; 3]>, targets: Vec<Targets>) -> Vec<Morphed> {
     let both = bases.into_iter().zip(targets);
     both.map(|(base, targets)| Morphed { base: DVec3::from_array(base), targets }).collect()
 }

@@ -5,8 +5,8 @@
 //! is morphed, then carried by the joints of its skin, or by its node. Vertices of the file are welded where they have the
 //! same position before all that, and everything that moves them is the same, so that no motion tears them apart; what no
 //! animation moves is welded by its place in the world. Texture coordinates are those of the first set, with v turned upwards,
-//! as OBJ files have it. Normals are averaged at each vertex of every pose as those of an OBJ file are; if one is missing, or a morph target
-//! has none, all are computed from the triangles of the pose. Materials, pictures, cameras and lights are not read.
+//! as OBJ files have it. Normals are averaged at each vertex of every pose as those of an OBJ file are; if one is missing, or a
+//! morph target has none, all are computed from the triangles of the pose. Materials, pictures, cameras and lights are not read.
 //!
 //! | beside | what |
 //! |---|---|
@@ -108,10 +108,14 @@ impl Weights {
                     "mesh {index}: its primitives differ in how many morph targets they have"
                 )));
             }
-            document.spend(count as u64)?;
+            // What is asked again of every node that has the mesh, triangles or not.
+            document.spend((mesh.primitives.len() + count) as u64)?;
             match node.weights.as_ref().or(mesh.weights.as_ref()) {
                 Some(own) if own.len() != count || own.iter().any(|weight| !weight.is_finite()) => {
-                    let message = format!("node {id}: {:?} are no weights for {count} morph targets", own);
+                    let own = own.len();
+                    let message = format!(
+                        "node {id}: its {own} weights are not {count} finite numbers, one a morph target"
+                    );
                     return Err(document.error(message));
                 }
                 Some(own) => weights.rest.extend(own.iter().map(|weight| f64::from(*weight))),
