@@ -6,8 +6,10 @@ use clap::Subcommand;
 use clap::builder::PossibleValuesParser;
 use mesoshell::Result;
 use mesoshell::mesh::figure::Figure;
+use mesoshell::mesh::gltf::{self, Contents, Gltf};
+use mesoshell::mesh::info::{self, Info};
+use mesoshell::mesh::obj;
 use mesoshell::mesh::projection::Projection;
-use mesoshell::mesh::{info, obj};
 use serde::Serialize;
 
 use super::{Talk, table};
@@ -16,7 +18,7 @@ use super::{Talk, table};
 pub enum Command {
     /// Count what a mesh file holds
     Info {
-        /// An OBJ file
+        /// An OBJ or glTF file
         file: PathBuf,
         /// Where the file has no texture coordinates: planar-x, planar-y, planar-z, spherical or box
         #[arg(long, value_parser = str::parse::<Projection>)]
@@ -63,10 +65,26 @@ fn make(figure: &str, output: PathBuf, talk: Talk) -> Result<()> {
     })
 }
 
+/// What `info` prints with `--json`.
+#[derive(Serialize)]
+struct Told<'a> {
+    #[serde(flatten)]
+    info: Info,
+    /// Of the mesh at rest.
+    #[serde(flatten)]
+    gltf: Option<Contents<'a>>,
+}
+
 fn tell(file: &Path, projection: Option<&Projection>, talk: Talk) -> Result<()> {
-    let info = info::info(&obj::load(file, projection)?);
-    talk.result(&info, || {
-        let rows = [
+    let gltf = gltf::has_name_of_one(file).then(|| Gltf::load(file, projection)).transpose()?;
+    let info = info::info(&match &gltf {
+        Some(gltf) => gltf.mesh(None)?,
+        None => obj::load(file, projection)?,
+    });
+    let told = Told { info, gltf: gltf.as_ref().map(Gltf::contents) };
+    talk.result(&told, || {
+        let info = &told.info;
+        let mut rows = vec![
             ("positions", info.positions.to_string()),
             ("triangles", info.triangles.to_string()),
             ("edges", info.edges.to_string()),
@@ -80,6 +98,12 @@ fn tell(file: &Path, projection: Option<&Projection>, talk: Talk) -> Result<()> 
             ("area", info.area.to_string()),
             ("texture coordinates", format!("{} to {}", info.uv_low, info.uv_high)),
         ];
+        if let Some(Contents { vertices, joints, morph_targets, clips }) = &told.gltf {
+            rows.push(("vertices in the file", vertices.to_string()));
+            rows.push(("joints", joints.to_string()));
+            rows.push(("morph targets", morph_targets.to_string()));
+            rows.extend(clips.iter().map(|clip| ("clip", format!("{}, {} s", clip.name, clip.duration))));
+        }
         format!("{}\n{}", file.display(), table(rows))
     })
 }

@@ -4,6 +4,7 @@ pub mod deform;
 pub mod figure;
 pub mod flow;
 pub mod generate;
+pub mod gltf;
 pub mod info;
 pub mod model;
 pub mod normals;

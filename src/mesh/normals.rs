@@ -5,6 +5,17 @@
 
 use glam::DVec3;
 
+/// What to do about a position without a normal.
+pub(super) const ADVICE: &str =
+    "delete degenerate faces, and one side of surfaces that are doubled back to back";
+
+/// What is wrong where there is no normal.
+pub(super) fn missing(position: DVec3) -> String {
+    format!(
+        "the position {position} has no normal: its faces have no area, or face opposite ways and cancel out"
+    )
+}
+
 /// Unit normals, one a position.
 ///
 /// Where `corner_normals` (one a triangle corner, of any length) are given, they are averaged; where there are
@@ -18,16 +29,26 @@ pub fn per_position(
     triangles: &[[u32; 3]],
     corner_normals: Option<&[[DVec3; 3]]>,
 ) -> Result<Vec<DVec3>, usize> {
+    let normals = where_there_are(positions, triangles, corner_normals);
+    normals.into_iter().enumerate().map(|(id, normal)| normal.ok_or(id)).collect()
+}
+
+/// As [`per_position`], with none where there is none.
+pub fn where_there_are(
+    positions: &[DVec3],
+    triangles: &[[u32; 3]],
+    corner_normals: Option<&[[DVec3; 3]]>,
+) -> Vec<Option<DVec3>> {
     let given = corner_normals.map(|normals| average(positions, triangles, |triangle| normals[triangle]));
-    if let Some(given) = &given
-        && let Some(given) = given.iter().copied().collect()
-    {
-        return Ok(given);
+    let mut normals = given.unwrap_or_else(|| vec![None; positions.len()]);
+    if normals.iter().all(Option::is_some) {
+        return normals;
     }
     let own = average(positions, triangles, |triangle| {
         [facet_normal(triangles[triangle].map(|id| positions[id as usize])); 3]
     });
-    (0..positions.len()).map(|id| given.as_ref().and_then(|given| given[id]).or(own[id]).ok_or(id)).collect()
+    normals.iter_mut().zip(own).for_each(|(normal, own)| *normal = normal.or(own));
+    normals
 }
 
 /// The unit normal of a counter-clockwise triangle; zero where its height is below 1e-12 of its longest

@@ -8,6 +8,10 @@ use serde::Deserialize;
 
 use super::normals::facet_normal;
 
+/// What to do about a mesh without texture coordinates.
+pub(super) const ADVICE: &str = "export the mesh with UVs, or set `projection` under `[mesh]` in the scene to \"spherical\", \"box\", \
+                                 \"planar-x\", \"planar-y\" or \"planar-z\"";
+
 /// A world axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Axis {

@@ -141,18 +141,21 @@ pub struct MeshSection {
     pub file: Option<PathBuf>,
     /// How texture coordinates are made, in place of those of the file.
     pub projection: Option<Projection>,
-    /// Of a sequence of files: how many a second.
+    /// Of a glTF file: the name of an animation; by default the first.
+    pub clip: Option<Spanned<String>>,
+    /// Of a sequence of files: how many a second. Of a glTF file: how many seconds of the clip a second.
     pub rate: Option<Rate>,
-    /// Of a sequence of files: seconds after its first; by default the time of the frame.
+    /// Of a sequence of files: seconds after its first. Of a glTF file: seconds after the beginning of the clip. By default the time of the frame.
     pub time: Option<Finite>,
     /// Where it is.
     pub transform: Option<TransformSection>,
 }
 
 impl MeshSection {
-    /// The same, with what the mesh that is loaded does not depend on as if nothing were said of it; of a sequence, without when.
+    /// The same, with what the mesh that is loaded does not depend on as if nothing were said of it; of what moves by itself,
+    /// without when.
     pub(super) fn loaded(&self) -> Self {
-        Self { rate: None, time: None, transform: None, ..self.clone() }
+        Self { clip: None, rate: None, time: None, transform: None, ..self.clone() }
     }
 }
 
@@ -487,6 +490,16 @@ recipe = "fog.toml"
             }
         }
         assert_eq!(found, 8 + 12 + 6 + 3 + 3 + 10 + 2 + 3);
+        let text = Text::new("keys", "[mesh]\nfile = \"a.glb\"\nunknown_key = 1".to_owned(), &[]).unwrap();
+        let message = text.parse::<SceneFile>(("mesh", "generator")).unwrap_err().to_string();
+        let (_, documented) = DOCUMENTATION.split_once("\n## `[mesh]`").unwrap();
+        let documented = documented.split("\n## ").next().unwrap();
+        let mesh: Vec<&str> =
+            message.split_once(", expected ").unwrap().1.split('`').skip(1).step_by(2).collect();
+        assert_eq!(mesh.len(), 7);
+        // The last is a section of its own.
+        assert!(mesh[..6].iter().all(|key| documented.contains(&format!("\n| `{key}` |"))), "{mesh:?}");
+        assert!(documented.contains(&format!("\n### `[mesh.{}]`", mesh[6])), "{mesh:?}");
         let wind = keys("shell.wind");
         assert_eq!(wind, ["direction", "strength", "gust", "size", "phase"]);
         let (_, documented) = DOCUMENTATION.split_once("\n### `[shell.wind]`").unwrap();

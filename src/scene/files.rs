@@ -1,7 +1,7 @@
 //! Which files a scene is made of.
 //!
 //! Whatever string in a scene or a recipe is the name of something that exists, beside the text, is taken for a file that is read:
-//! too many do no harm to those who ask whether one of them has changed. Of the files that name others (recipes, OBJ, MTL, NRRD)
+//! too many do no harm to those who ask whether one of them has changed. Of the files that name others (recipes, OBJ, MTL, glTF, NRRD)
 //! these are taken too.
 
 use std::collections::BTreeSet;
@@ -11,6 +11,7 @@ use toml::{Table, Value};
 
 use super::numbered;
 use crate::input;
+use crate::mesh::gltf;
 use crate::volume::stack;
 
 /// The files that a text in TOML names, relative to `folder`; sorted, none twice.
@@ -64,6 +65,7 @@ fn add(path: &Path, files: &mut BTreeSet<PathBuf>) {
             return;
         }
         "obj" => names_after("mtllib "),
+        "glb" | "gltf" => gltf::named_files(path),
         "mtl" => names_after("map_Kd "),
         "nhdr" | "nrrd" => [names_after("data file:"), names_after("datafile:")].concat(),
         _ => return,
@@ -87,7 +89,10 @@ mod tests {
         write("tree.obj", "# a tree\nmtllib tree.mtl\r\nv 0 0 0\n");
         write("tree.mtl", "newmtl bark\n  map_Kd bark.png\n");
         write("fog.nhdr", "NRRD0005\ndata file: data.raw\n");
+        write("walk 1.bin", "");
+        write("fox.gltf", r#"{ "buffers": [{ "uri": "walk%201.bin" }, { "uri": "data:,a" }, {}], "a": [] }"#);
         let text = "volume.recipe = 'relief.toml'\nsolid = [{ file = 'tree.obj' }, { file = 'none.obj' }]\n\
+                    mesh.file = 'fox.gltf'\n\
                     a = { b = ['slices', 'fog.nhdr'] }\n";
         let found = of(text, folder.path());
         let found: Vec<_> =
@@ -96,12 +101,14 @@ mod tests {
             "bark.png",
             "data.raw",
             "fog.nhdr",
+            "fox.gltf",
             "letters.png",
             "relief.toml",
             "slices/1.png",
             "slices/2.png",
             "tree.mtl",
             "tree.obj",
+            "walk 1.bin",
         ];
         assert_eq!(found, expected);
     }

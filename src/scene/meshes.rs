@@ -1,4 +1,5 @@
-//! Meshes that follow one another: `walk.####.obj`, all of the same triangles. Between two files positions go in straight lines.
+//! Meshes that move by themselves. Those of a sequence, `walk.####.obj`, follow one another, and have all the same triangles: between
+//! two files positions go in straight lines. That of a glTF file has its clips.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -6,6 +7,7 @@ use std::sync::Arc;
 use super::file::MeshSection;
 use super::numbered;
 use super::timeline::Moment;
+use crate::mesh::gltf::{Gltf, Pose};
 use crate::mesh::{Mesh, Projection, obj};
 use crate::{Error, Result};
 
@@ -21,9 +23,37 @@ pub(super) struct Between {
     part: f64,
 }
 
+/// What a mesh that moves by itself shows.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Shown {
+    Between(Between),
+    /// Of a glTF file; without one it is at rest.
+    Pose(Option<Pose>),
+}
+
+/// A file that was read, and the projection with which it was.
+struct Read<Of> {
+    path: PathBuf,
+    projection: Option<Projection>,
+    of: Arc<Of>,
+}
+
 /// The files that were read last.
 #[derive(Default)]
-pub(super) struct MeshFiles(Vec<(PathBuf, Option<Projection>, Arc<Mesh>)>);
+pub(super) struct MeshFiles {
+    sequence: Vec<Read<Mesh>>,
+    gltf: Option<Read<Gltf>>,
+}
+
+impl<Of> Read<Of> {
+    fn is(&self, path: &Path, projection: Option<&Projection>) -> bool {
+        self.path == path && self.projection.as_ref() == projection
+    }
+
+    fn new(path: &Path, projection: Option<&Projection>, of: Of) -> Self {
+        Self { path: path.to_owned(), projection: projection.cloned(), of: Arc::new(of) }
+    }
+}
 
 impl Between {
     /// What `files`, at least one, show at a moment.
@@ -52,21 +82,30 @@ impl Between {
         if projection.is_some() {
             mesh.uvs.clone_from(&files.get(&self.first, projection)?.uvs);
         }
-        files.0.retain(|(path, ..)| [&self.first, &self.from, &self.to].contains(&path));
+        files.sequence.retain(|read| [&self.first, &self.from, &self.to].contains(&&read.path));
         Ok(mesh)
     }
 }
 
 impl MeshFiles {
     fn get(&mut self, path: &Path, projection: Option<&Projection>) -> Result<Arc<Mesh>> {
-        let is_it =
-            |(other, by, _): &&(PathBuf, Option<Projection>, _)| other == path && by.as_ref() == projection;
-        if let Some((.., mesh)) = self.0.iter().find(is_it) {
-            return Ok(mesh.clone());
+        if let Some(read) = self.sequence.iter().find(|read| read.is(path, projection)) {
+            return Ok(read.of.clone());
         }
-        let mesh = Arc::new(obj::load(path, projection)?);
-        self.0.push((path.to_owned(), projection.cloned(), mesh.clone()));
+        let read = Read::new(path, projection, obj::load(path, projection)?);
+        let mesh = read.of.clone();
+        self.sequence.push(read);
         Ok(mesh)
+    }
+
+    /// # Errors
+    /// As [`Gltf::load`].
+    pub(super) fn gltf(&mut self, path: &Path, projection: Option<&Projection>) -> Result<Arc<Gltf>> {
+        let read = match self.gltf.take() {
+            Some(read) if read.is(path, projection) => read,
+            _ => Read::new(path, projection, Gltf::load(path, projection)?),
+        };
+        Ok(self.gltf.insert(read).of.clone())
     }
 }
 

@@ -13,7 +13,7 @@ use super::file::{
 };
 use super::lighting::Lighting;
 use super::load::Loaded;
-use super::meshes::{Between, MeshFiles};
+use super::meshes::{MeshFiles, Shown};
 use super::motion::Motion;
 use super::solids::Solids;
 use super::source::{MeshSource, VolumeSource};
@@ -135,8 +135,8 @@ struct Ahead {
 /// The parts of the last scene.
 #[derive(Default)]
 pub(super) struct Parts {
-    /// See [`MeshSection::loaded`], and what a sequence shows.
-    mesh: Kept<(MeshSection, Option<Between>), Arc<Mesh>>,
+    /// See [`MeshSection::loaded`] and [`MeshSource::shown`].
+    mesh: Kept<(MeshSection, Option<Shown>), Arc<Mesh>>,
     mesh_files: MeshFiles,
     moved: Kept<(Same<Mesh>, Motion), Arc<Mesh>>,
     thickness_map: Kept<PathBuf, Arc<Grey>>,
@@ -152,7 +152,7 @@ pub(super) struct Parts {
     backdrop: Kept<ImageSection, Backdrop>,
 }
 
-/// A scene's text, read and checked as far as that goes without its mesh and its volume.
+/// A scene's text, read and checked as far as that goes without its mesh, unless that is of a glTF file, and its volume.
 pub(super) struct Checked<'a> {
     text: &'a Text,
     file: &'a SceneFile,
@@ -165,30 +165,7 @@ pub(super) struct Checked<'a> {
     lighting: Option<Lighting<'a>>,
 }
 
-impl<'a> Checked<'a> {
-    /// `base_dir` is where the text's paths start.
-    ///
-    /// # Errors
-    /// As [`load`](super::load()).
-    pub(super) fn new(
-        text: &'a Text,
-        file: &'a SceneFile,
-        base_dir: &'a Path,
-        moment: Moment,
-    ) -> Result<Self> {
-        Ok(Self {
-            camera: cameras::camera(text, file)?,
-            mesh: MeshSource::of(text, &file.mesh, base_dir, moment)?,
-            motion: Motion::of(text, file.mesh.get_ref().transform.as_ref(), &file.deform)?,
-            wind: file.shell.wind.as_ref().map(|wind| wind.wind(text)).transpose()?,
-            volume: VolumeSource::of(text, &file.volume, base_dir, moment)?,
-            lighting: Lighting::of(text, file, base_dir)?,
-            text,
-            file,
-            base_dir,
-        })
-    }
-
+impl Checked<'_> {
     fn shell_options(&self, thickness_scale: Vec<f64>) -> ShellOptions {
         let shell = &self.file.shell;
         ShellOptions {
@@ -240,6 +217,30 @@ impl<'a> Checked<'a> {
 }
 
 impl Parts {
+    /// Reads and checks a text; `base_dir` is where its paths start.
+    ///
+    /// # Errors
+    /// As [`load`](super::load()).
+    pub(super) fn check<'a>(
+        &mut self,
+        text: &'a Text,
+        file: &'a SceneFile,
+        base_dir: &'a Path,
+        moment: Moment,
+    ) -> Result<Checked<'a>> {
+        Ok(Checked {
+            camera: cameras::camera(text, file)?,
+            mesh: MeshSource::of(text, &file.mesh, base_dir, moment, &mut self.mesh_files)?,
+            motion: Motion::of(text, file.mesh.get_ref().transform.as_ref(), &file.deform)?,
+            wind: file.shell.wind.as_ref().map(|wind| wind.wind(text)).transpose()?,
+            volume: VolumeSource::of(text, &file.volume, base_dir, moment)?,
+            lighting: Lighting::of(text, file, base_dir)?,
+            text,
+            file,
+            base_dir,
+        })
+    }
+
     /// The shell of a scene, and what it is made of; `stopwatch` is told what was not kept.
     fn shell(
         &mut self,
@@ -247,7 +248,7 @@ impl Parts {
         progress: &dyn Progress,
         stopwatch: &mut Stopwatch,
     ) -> Result<(Arc<Mesh>, Arc<Shell>)> {
-        let of_mesh = (checked.file.mesh.get_ref().loaded(), checked.mesh.between().cloned());
+        let of_mesh = (checked.file.mesh.get_ref().loaded(), checked.mesh.shown());
         let mesh = self.mesh.get(of_mesh, |_| {
             progress.stage("loading the mesh");
             let mesh = checked.mesh.load(&mut self.mesh_files)?;

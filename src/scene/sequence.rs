@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::file::SceneFile;
 use super::load::Loaded;
-use super::parts::{Checked, Parts, Rest};
+use super::parts::{Parts, Rest};
 use super::text::Text;
 use super::timeline::{Moment, Timeline, Track};
 use super::{Sizes, files, load, meshes, source};
@@ -41,7 +41,7 @@ impl Sequence {
     /// # Errors
     /// As [`load`](super::load()); an error in a frame names the tracks that make it.
     pub fn open(path: &Path, overrides: &[String]) -> Result<Self> {
-        let sequence = Self::of(load::text(path, overrides)?, path.parent().unwrap_or(Path::new("")))?;
+        let mut sequence = Self::of(load::text(path, overrides)?, path.parent().unwrap_or(Path::new("")))?;
         sequence.check_frames()?;
         Ok(sequence)
     }
@@ -55,11 +55,12 @@ impl Sequence {
         Ok(Self { text, base_dir, timeline, tracks, parts: Parts::default(), rest: None })
     }
 
-    /// All that can be wrong in a frame, but for what its files hold; sequences of files are read, to see that they fit together.
-    fn check_frames(&self) -> Result<()> {
+    /// All that can be wrong in a frame, but for what its files hold; glTF files are read, since they name their animations, and
+    /// sequences of files, to see that they fit together.
+    fn check_frames(&mut self) -> Result<()> {
         for frame in 1..=if self.tracks.is_empty() { 1 } else { self.timeline.frames } {
             let text = self.text_at(frame)?;
-            Checked::new(&text, &load::read(&text)?, &self.base_dir, self.moment(frame))?;
+            self.parts.check(&text, &load::read(&text)?, &self.base_dir, self.moment(frame))?;
         }
         let file = load::read(&self.text)?;
         meshes::check_all(file.mesh.get_ref(), &self.base_dir)?;
@@ -88,12 +89,12 @@ impl Sequence {
         if self.rest.is_none() && self.timeline.frames > 1 {
             let text = self.text_at(1)?;
             let file = load::read(&text)?;
-            let checked = Checked::new(&text, &file, &self.base_dir, self.moment(1))?;
+            let checked = self.parts.check(&text, &file, &self.base_dir, self.moment(1))?;
             self.rest = Some(self.parts.rest(&checked, progress)?);
         }
         let text = self.text_at(frame)?;
         let file = load::read(&text)?;
-        let checked = Checked::new(&text, &file, &self.base_dir, self.moment(frame))?;
+        let checked = self.parts.check(&text, &file, &self.base_dir, self.moment(frame))?;
         self.parts.build(&checked, self.rest.as_ref(), progress, admit)
     }
 
@@ -107,7 +108,7 @@ impl Sequence {
         let Some(rest) = &self.rest else { return Ok(()) };
         let text = self.text_at(frame)?;
         let file = load::read(&text)?;
-        let checked = Checked::new(&text, &file, &self.base_dir, self.moment(frame))?;
+        let checked = self.parts.check(&text, &file, &self.base_dir, self.moment(frame))?;
         self.parts.prefetch(&checked, rest);
         Ok(())
     }

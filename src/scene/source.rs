@@ -1,15 +1,17 @@
 //! Where a scene's mesh and volume come from: a generator or a recipe, or a file.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use toml::Spanned;
 
 use super::file::{self, DensitySection, MeshSection, VolumeSection};
-use super::meshes::{Between, MeshFiles};
+use super::meshes::{Between, MeshFiles, Shown};
 use super::numbered;
 use super::text::Text;
 use super::timeline::Moment;
 use crate::mesh::generate::Generator;
+use crate::mesh::gltf::{self, Gltf, Pose};
 use crate::mesh::projection::Projection;
 use crate::mesh::{Mesh, obj};
 use crate::volume::recipe::{self, Recipe};
@@ -39,10 +41,12 @@ pub(super) enum MeshSource<'a> {
     Generator(&'a Generator),
     File(PathBuf, Option<&'a Projection>),
     Sequence(Between, Option<&'a Projection>),
+    Gltf(Arc<Gltf>, Option<Pose>),
 }
 
 impl<'a> MeshSource<'a> {
-    /// What a section names, if that is one thing; of a sequence, what it shows at that moment.
+    /// What a section names, if that is one thing; of what moves by itself, what it shows at that moment. A glTF file is read,
+    /// unless it is among `meshes`, which were read before.
     ///
     /// # Errors
     /// [`Error`] with the spot, or with the file.
@@ -51,6 +55,7 @@ impl<'a> MeshSource<'a> {
         section: &'a Spanned<MeshSection>,
         base_dir: &Path,
         moment: Moment,
+        meshes: &mut MeshFiles,
     ) -> Result<Self> {
         match section.get_ref() {
             MeshSection { generator: Some(generator), file: None, projection: None, .. } => {
@@ -60,11 +65,23 @@ impl<'a> MeshSource<'a> {
                 })?;
                 Ok(Self::Generator(generator))
             }
-            MeshSection { generator: None, file: Some(file), projection, rate, time, .. } => {
+            MeshSection { generator: None, file: Some(file), projection, clip, rate, time, .. } => {
                 let path = base_dir.join(file);
-                let Some(files) = numbered::files(&path)? else {
+                let files = numbered::files(&path)?;
+                if gltf::has_name_of_one(&path) {
+                    if files.is_some() {
+                        let message =
+                            "a sequence is one of OBJ files: a glTF file holds its animations itself";
+                        return Err(Error::input(path, message).with_help("name a single file"));
+                    }
+                    return Self::gltf(text, section, &path, moment, meshes);
+                }
+                if let Some(clip) = clip {
+                    return Err(text.error(clip.span(), "`clip` is for a glTF file, .glb or .gltf"));
+                }
+                let Some(files) = files else {
                     if rate.is_some() || time.is_some() {
-                        let message = "`rate` and `time` are for a sequence of files: `file` has no `#`";
+                        let message = "`rate` and `time` are for a sequence of files, with a `#` in `file`, and for a glTF file";
                         return Err(text.error(section.span(), message));
                     }
                     return Ok(Self::File(path, projection.as_ref()));
@@ -77,20 +94,53 @@ impl<'a> MeshSource<'a> {
         }
     }
 
-    /// What it shows, if it is a sequence.
-    pub(super) fn between(&self) -> Option<&Between> {
+    /// A glTF file, in the pose that a section says it has at that moment.
+    fn gltf(
+        text: &Text,
+        section: &Spanned<MeshSection>,
+        path: &Path,
+        moment: Moment,
+        meshes: &mut MeshFiles,
+    ) -> Result<Self> {
+        let MeshSection { projection, clip, rate, time, .. } = section.get_ref();
+        let gltf = meshes.gltf(path, projection.as_ref())?;
+        let clips = gltf.clips();
+        let at = rate.map_or(1.0, |rate| rate.0) * time.map_or(moment.time, |time| time.0);
+        if let Some(clip) = clip {
+            let index = clips.iter().position(|one| one.name == *clip.get_ref()).ok_or_else(|| {
+                let names: Vec<String> = clips.iter().map(|clip| format!("\"{}\"", clip.name)).collect();
+                let there_are = if names.is_empty() { "none".to_owned() } else { names.join(", ") };
+                let message = format!("{} has no animation \"{}\"", path.display(), clip.get_ref());
+                text.error(clip.span(), message).with_help(format!("those that it has: {there_are}"))
+            })?;
+            let pose = gltf.pose(index, at);
+            return Ok(Self::Gltf(gltf, Some(pose)));
+        }
+        if clips.is_empty() && (rate.is_some() || time.is_some()) {
+            let message = format!("`rate` and `time` are for an animation, but {} has none", path.display());
+            return Err(text.error(section.span(), message));
+        }
+        // The first, where there is one.
+        let pose = (!clips.is_empty()).then(|| gltf.pose(0, at));
+        Ok(Self::Gltf(gltf, pose))
+    }
+
+    /// What it shows, if it moves by itself.
+    pub(super) fn shown(&self) -> Option<Shown> {
         match self {
-            Self::Sequence(between, _) => Some(between),
-            _ => None,
+            Self::Generator(_) | Self::File(..) => None,
+            Self::Sequence(between, _) => Some(Shown::Between(between.clone())),
+            Self::Gltf(_, pose) => Some(Shown::Pose(*pose)),
         }
     }
 
-    /// `files` are those that were read for the sequence before.
-    pub(super) fn load(&self, files: &mut MeshFiles) -> Result<Mesh> {
+    /// `meshes` are those that were read before.
+    pub(super) fn load(&self, meshes: &mut MeshFiles) -> Result<Mesh> {
         match self {
             Self::Generator(generator) => generator.build(),
             Self::File(file, projection) => obj::load(file, *projection),
-            Self::Sequence(between, projection) => between.load(*projection, files),
+            Self::Sequence(between, projection) => between.load(*projection, meshes),
+            Self::Gltf(gltf, pose) => gltf.mesh(*pose),
         }
     }
 }

@@ -89,9 +89,12 @@ impl Ready {
 
 /// The unit normal after a map with this Jacobian.
 pub(super) fn carried(jacobian: DMat3, normal: DVec3) -> DVec3 {
-    let DMat3 { x_axis: x, y_axis: y, z_axis: z } = jacobian;
-    let moved = DMat3::from_cols(y.cross(z), z.cross(x), x.cross(y)) * normal;
-    moved.try_normalize().unwrap_or(normal)
+    (cofactor(jacobian) * normal).try_normalize().unwrap_or(normal)
+}
+
+/// The cofactor matrix.
+pub(super) fn cofactor(DMat3 { x_axis: x, y_axis: y, z_axis: z }: DMat3) -> DMat3 {
+    DMat3::from_cols(y.cross(z), z.cross(x), x.cross(y))
 }
 
 /// The matrix `column row^T`.

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use crate::mesh::LARGEST_COORDINATE;
+use crate::mesh::{LARGEST_COORDINATE, projection};
 use crate::{Error, Result};
 
 /// What [`check`] let through.
@@ -41,10 +41,7 @@ impl Checked {
         } else {
             "the mesh has no texture coordinates, and a shell texture needs them".into()
         };
-        Err(Error::input(path, message).with_help(
-            "export the mesh with UVs, or set `projection` under `[mesh]` in the scene to \"spherical\", \"box\", \
-             \"planar-x\", \"planar-y\" or \"planar-z\"",
-        ))
+        Err(Error::input(path, message).with_help(projection::ADVICE))
     }
 }
 

@@ -166,12 +166,7 @@ fn parse(path: &Path, text: &str, projection: Option<&Projection>) -> Result<Loa
     });
     let normals = normals::per_position(&welded.positions, &welded.triangles, file_normals.as_deref())
         .map_err(|id| {
-            let message = format!(
-                "the position {} has no normal: its faces have no area, or face opposite ways and cancel out",
-                welded.positions[id]
-            );
-            Error::input(path, message)
-                .with_help("delete degenerate faces, and one side of surfaces that are doubled back to back")
+            Error::input(path, normals::missing(welded.positions[id])).with_help(normals::ADVICE)
         })?;
 
     let uvs = match projection {

@@ -1,0 +1,812 @@
+//! glTF files, put together here: what they hold, how it moves, and what is wrong with them.
+
+use std::f64::consts::{FRAC_1_SQRT_2, FRAC_PI_4, FRAC_PI_8};
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::Arc;
+
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
+use glam::{DVec2, DVec3};
+use mesoshell::Error;
+use mesoshell::mesh::gltf::Gltf;
+use mesoshell::mesh::{Mesh, info};
+use mesoshell::progress::Silent;
+use mesoshell::scene::{Loaded, Scene, Sequence};
+use rand::{RngExt, SeedableRng};
+use serde_json::{Value, json};
+
+/// A glTF file: its text, and its one buffer.
+#[derive(Clone)]
+struct File {
+    root: Value,
+    bytes: Vec<u8>,
+}
+
+impl File {
+    /// One scene of `nodes`, of which the first is its root.
+    fn new(nodes: Value) -> Self {
+        let root = json!({
+            "asset": { "version": "2.0" }, "scene": 0, "scenes": [{ "nodes": [0] }], "nodes": nodes,
+            "meshes": [], "accessors": [], "bufferViews": [],
+        });
+        Self { root, bytes: Vec::new() }
+    }
+
+    fn add(&mut self, list: &str, value: Value) -> usize {
+        let list = self.root[list].as_array_mut().unwrap();
+        list.push(value);
+        list.len() - 1
+    }
+
+    /// An accessor of elements of the type, component type and bytes given.
+    fn accessor(&mut self, shape: &str, component: u32, count: usize, bytes: &[u8]) -> usize {
+        let offset = self.bytes.len();
+        self.bytes.extend_from_slice(bytes);
+        self.bytes.resize(self.bytes.len().next_multiple_of(4), 0);
+        let view = json!({ "buffer": 0, "byteOffset": offset, "byteLength": bytes.len() });
+        let view = self.add("bufferViews", view);
+        let accessor =
+            json!({ "bufferView": view, "componentType": component, "count": count, "type": shape });
+        self.add("accessors", accessor)
+    }
+
+    fn floats<const N: usize>(&mut self, shape: &str, elements: &[[f32; N]]) -> usize {
+        let bytes: Vec<u8> = elements.iter().flatten().flat_map(|x| x.to_le_bytes()).collect();
+        self.accessor(shape, 5126, elements.len(), &bytes)
+    }
+
+    fn indices(&mut self, indices: &[u8]) -> usize {
+        self.accessor("SCALAR", 5121, indices.len(), indices)
+    }
+
+    /// A clip that moves one property of one node.
+    fn clip<const N: usize>(
+        &mut self,
+        name: &str,
+        (node, path): (usize, &str),
+        interpolation: &str,
+        times: &[f32],
+        values: &[[f32; N]],
+    ) {
+        let times: Vec<[f32; 1]> = times.iter().map(|&time| [time]).collect();
+        let input = self.floats("SCALAR", &times);
+        let output = self.floats(["SCALAR", "", "VEC3", "VEC4"][N - 1], values);
+        let clip = json!({
+            "name": name,
+            "samplers": [{ "input": input, "interpolation": interpolation, "output": output }],
+            "channels": [{ "sampler": 0, "target": { "node": node, "path": path } }],
+        });
+        if self.root["animations"].is_null() {
+            self.root["animations"] = json!([]);
+        }
+        self.add("animations", clip);
+    }
+
+    /// The text, with its buffer at `uri`.
+    fn text(&self, uri: &str) -> Vec<u8> {
+        let mut root = self.root.clone();
+        root["buffers"] = json!([{ "byteLength": self.bytes.len(), "uri": uri }]);
+        root.to_string().into_bytes()
+    }
+
+    fn data_uri(&self) -> String {
+        format!("data:application/octet-stream;base64,{}", STANDARD.encode(&self.bytes))
+    }
+
+    fn binary(&self) -> Vec<u8> {
+        let mut root = self.root.clone();
+        if root["buffers"].is_null() {
+            root["buffers"] = json!([{ "byteLength": self.bytes.len() }]);
+        }
+        let mut json = root.to_string().into_bytes();
+        json.resize(json.len().next_multiple_of(4), b' ');
+        let mut bytes = b"glTF\x02\0\0\0".to_vec();
+        bytes.extend((28 + json.len() as u32 + self.bytes.len() as u32).to_le_bytes());
+        for (kind, chunk) in [(b"JSON", &json), (b"BIN\0", &self.bytes)] {
+            bytes.extend((chunk.len() as u32).to_le_bytes());
+            bytes.extend(kind);
+            bytes.extend(chunk);
+        }
+        bytes
+    }
+
+    fn load(&self) -> Gltf {
+        self.try_load().unwrap_or_else(|error| panic!("{error}"))
+    }
+
+    fn try_load(&self) -> Result<Gltf, Error> {
+        load(&self.binary())
+    }
+}
+
+fn load(bytes: &[u8]) -> Result<Gltf, Error> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("file.glb");
+    std::fs::write(&path, bytes).unwrap();
+    Gltf::load(path, None)
+}
+
+const CORNERS: [[f32; 3]; 3] = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+const UVS: [[f32; 2]; 3] = [[0.0, 0.0], [1.0, 0.0], [0.0, 0.25]];
+
+/// A triangle that faces Z, of the first of these nodes.
+fn triangle(nodes: Value) -> File {
+    let mut file = File::new(nodes);
+    let (positions, uvs) = (file.floats("VEC3", &CORNERS), file.floats("VEC2", &UVS));
+    let attributes = json!({ "POSITION": positions, "TEXCOORD_0": uvs });
+    file.add("meshes", json!({ "primitives": [{ "attributes": attributes }] }));
+    file
+}
+
+/// A strip of three rows, at y = 0, 1.5 and 2, on two joints: one at the origin, one a unit above, which turns about Z by 90
+/// degrees within a second and then rests. The lowest row is held by the first, the highest by the second, the other by both.
+fn arm() -> File {
+    let mut file = File::new(json!([
+        { "children": [1, 2], "translation": [0, 0, 0] },
+        { "mesh": 0, "skin": 0, "translation": [5, 6, 7] },
+        { "children": [3] },
+        { "translation": [0, 1, 0] },
+    ]));
+    let rows = [0.0, 1.5, 2.0].map(|y| [[0.0, y, 0.0], [0.25, y, 0.0]]);
+    let positions = file.floats("VEC3", rows.as_flattened());
+    let uvs = file.floats("VEC2", &[0, 1, 2, 3, 4, 5].map(|i| [(i % 2) as f32, (i / 2) as f32]));
+    let [low, half, high] = [[255, 0, 0, 0], [128, 128, 0, 0], [0, 0, 0, 255]];
+    let weights = file.accessor("VEC4", 5121, 6, &[low, low, half, half, high, high].concat());
+    file.root["accessors"][weights]["normalized"] = json!(true);
+    let joints = file.accessor("VEC4", 5121, 6, &[[0, 1, 0, 1]; 6].concat());
+    let indices = file.indices(&[0, 1, 2, 3, 4, 5]);
+    let matrix = |y: f32| {
+        let mut matrix: [f32; 16] = std::array::from_fn(|i| if i % 5 == 0 { 1.0 } else { 0.0 });
+        matrix[13] = -y;
+        matrix
+    };
+    let matrices = file.floats("MAT4", &[matrix(0.0), matrix(1.0)]);
+    file.root["skins"] = json!([{ "joints": [2, 3], "inverseBindMatrices": matrices }]);
+    let attributes =
+        json!({ "POSITION": positions, "TEXCOORD_0": uvs, "JOINTS_0": joints, "WEIGHTS_0": weights });
+    file.add(
+        "meshes",
+        json!({ "primitives": [{ "attributes": attributes, "indices": indices, "mode": 5 }] }),
+    );
+    let quarter = FRAC_1_SQRT_2 as f32;
+    let turns = [[0.0, 0.0, 0.0, 1.0], [0.0, 0.0, quarter, quarter], [0.0, 0.0, quarter, quarter]];
+    file.clip("bend", (3, "rotation"), "LINEAR", &[0.0, 1.0, 2.0], &turns);
+    file
+}
+
+fn posed(gltf: &Gltf, time: f64) -> Mesh {
+    gltf.mesh(Some(gltf.pose(0, time))).unwrap()
+}
+
+/// Single precision of the file's numbers.
+#[track_caller]
+fn assert_near(a: DVec3, b: DVec3) {
+    assert!((a - b).length() < 1e-6, "{a} instead of {b}");
+}
+
+#[test]
+fn a_skin_bends_as_its_joints_do() {
+    let gltf = arm().load();
+    let contents = gltf.contents();
+    assert_eq!((contents.vertices, contents.joints, contents.morph_targets), (6, 2, 0));
+    assert_eq!((contents.clips[0].name.as_str(), contents.clips[0].duration), ("bend", 2.0));
+    let rest = gltf.mesh(None).unwrap();
+    assert_eq!((rest.positions.len(), rest.triangles.len()), (6, 4));
+    // The place of the node that has the skin does not count.
+    assert_eq!(rest.positions[0], DVec3::ZERO);
+    assert_eq!(posed(&gltf, 0.0), rest);
+    for (time, angle) in [(0.5, FRAC_PI_4), (1.0, 2.0 * FRAC_PI_4), (1.5, 2.0 * FRAC_PI_4)] {
+        let mesh = posed(&gltf, time);
+        let (sine, cosine) = f64::sin_cos(angle);
+        let turned = |x: f64, y: f64| {
+            DVec3::new(x * cosine - (y - 1.0) * sine, 1.0 + x * sine + (y - 1.0) * cosine, 0.0)
+        };
+        for (position, at_rest) in mesh.positions.iter().zip(&rest.positions) {
+            let DVec3 { x, y, .. } = *at_rest;
+            let expected = match y {
+                0.0 => *at_rest,
+                1.5 => at_rest.midpoint(turned(x, y)),
+                _ => turned(x, y),
+            };
+            assert_near(*position, expected);
+        }
+        assert!(mesh.normals.iter().all(|normal| (*normal - DVec3::Z).length() < 1e-12));
+        assert_eq!((&mesh.triangles, &mesh.uvs), (&rest.triangles, &rest.uvs));
+    }
+}
+
+#[test]
+fn a_morph_target_counts_by_its_weight() {
+    let mut file = triangle(json!([{ "mesh": 0 }]));
+    let up = file.floats("VEC3", &[[0.0; 3], [0.0; 3], [0.0, 0.0, 2.0]]);
+    // The second moves a single vertex: the others are left out.
+    let [ids, values] = [file.indices(&[1]), file.floats("VEC3", &[[1.0, 0.0, 0.0]])];
+    let view = |file: &File, accessor: usize| file.root["accessors"][accessor]["bufferView"].clone();
+    let sparse = json!({
+        "componentType": 5126, "count": 3, "type": "VEC3",
+        "sparse": {
+            "count": 1,
+            "indices": { "bufferView": view(&file, ids), "componentType": 5121 },
+            "values": { "bufferView": view(&file, values) },
+        },
+    });
+    let sparse = file.add("accessors", sparse);
+    file.root["meshes"][0]["primitives"][0]["targets"] = json!([{ "POSITION": up }, { "POSITION": sparse }]);
+    assert_eq!(file.load().mesh(None).unwrap().positions[2], DVec3::Y);
+    file.root["meshes"][0]["weights"] = json!([1, 1]);
+    let mesh = file.load().mesh(None).unwrap();
+    assert_eq!(mesh.positions[1..], [2.0 * DVec3::X, DVec3::new(0.0, 1.0, 2.0)]);
+    file.root["nodes"][0]["weights"] = json!([0.5, 0]);
+    let gltf = file.load();
+    assert_eq!(gltf.contents().morph_targets, 2);
+    let mesh = gltf.mesh(None).unwrap();
+    assert_eq!(mesh.positions[1..], [DVec3::X, DVec3::new(0.0, 1.0, 1.0)]);
+    // Of the triangle (1, 0, 0), (0, 1, 1).
+    assert_near(mesh.normals[0], DVec3::new(0.0, -1.0, 1.0).normalize());
+    file.clip("grow", (0, "weights"), "LINEAR", &[0.0, 2.0], &[[0.0], [0.0], [1.0], [0.5]]);
+    let mesh = posed(&file.load(), 1.0);
+    assert_eq!(mesh.positions[1..], [1.25 * DVec3::X, DVec3::new(0.0, 1.0, 1.0)]);
+}
+
+#[test]
+fn normals_of_the_file_are_morphed_and_carried() {
+    let half = FRAC_1_SQRT_2 as f32;
+    let mut file = triangle(json!([{ "mesh": 0, "rotation": [half, 0, 0, half], "scale": [1, 1, 2] }]));
+    let normals = file.floats("VEC3", &[[0.0, 0.0, 1.0]; 3]);
+    let primitive = "/meshes/0/primitives/0";
+    file.root.pointer_mut(primitive).unwrap()["attributes"]["NORMAL"] = json!(normals);
+    let still = [[0.0; 3]; 3];
+    let target = json!({ "POSITION": file.floats("VEC3", &still), "NORMAL": file.floats("VEC3", &[[0.0, 1.0, 0.0]; 3]) });
+    file.root.pointer_mut(primitive).unwrap()["targets"] = json!([target]);
+    // A quarter turn about X takes Z to -Y.
+    assert_near(file.load().mesh(None).unwrap().normals[0], DVec3::NEG_Y);
+    file.root["nodes"][0]["weights"] = json!([1]);
+    // (0, 1, 1), on what is stretched by 2 along Z, is (0, 2, 1); turned, (0, -1, 2).
+    assert_near(file.load().mesh(None).unwrap().normals[0], DVec3::new(0.0, -1.0, 2.0).normalize());
+    // Morph targets without normals: those of the triangles count.
+    file.root.pointer_mut(primitive).unwrap()["targets"][0].as_object_mut().unwrap().remove("NORMAL");
+    assert_near(file.load().mesh(None).unwrap().normals[0], DVec3::NEG_Y);
+}
+
+#[test]
+fn values_between_keys() {
+    let moved = |interpolation: &str, values: &[[f32; 3]], time: f64| {
+        let mut file = triangle(json!([{ "mesh": 0 }]));
+        file.clip("move", (0, "translation"), interpolation, &[1.0, 3.0], values);
+        file.clip("later", (0, "translation"), "STEP", &[9.0], &[[9.0; 3]]);
+        posed(&file.load(), time).positions[0].x
+    };
+    let line = [[0.0; 3], [1.0, 0.0, 0.0]];
+    for (time, expected) in [(0.0, 0.0), (1.0, 0.0), (1.5, 0.25), (2.5, 0.75)] {
+        assert_eq!(moved("LINEAR", &line, time), expected, "{time}");
+    }
+    let steps = [[2.0; 3], [1.0; 3]];
+    for (time, expected) in [(0.0, 2.0), (2.9, 2.0), (3.0 - 2e-6, 1.0)] {
+        assert_eq!(moved("STEP", &steps, time), expected, "{time}");
+    }
+    // Slopes of 1 from the first and -1 to the second key, two seconds apart: half way 0.5 + 2 / 8 (1 + 1).
+    let spline = [[7.0; 3], [0.0; 3], [1.0; 3], [-1.0; 3], [1.0; 3], [7.0; 3]];
+    for (time, expected) in [(0.5, 0.0), (2.0, 1.0), (1.5, 0.15625 + 2.0 * (0.140625 + 0.046875))] {
+        assert!((moved("CUBICSPLINE", &spline, time) - expected).abs() < 1e-15, "{time}");
+    }
+}
+
+#[test]
+fn rotations_go_the_shorter_way_and_stay_rotations() {
+    let (sine, cosine) = FRAC_PI_8.sin_cos();
+    let [sine, cosine] = [sine, cosine].map(|x| x as f32);
+    let turned = |interpolation: &str, values: &[[f32; 4]]| {
+        let mut file = triangle(json!([{ "mesh": 0 }]));
+        file.clip("turn", (0, "rotation"), interpolation, &[0.0, 1.0, 2.0], values);
+        posed(&file.load(), 0.5).positions[1]
+    };
+    let still = [0.0, 0.0, 0.0, 1.0];
+    // An eighth of a turn, written as its negative.
+    let eighth = [0.0, 0.0, -sine, -cosine];
+    assert_near(turned("LINEAR", &[still, eighth, still]), DVec3::new(FRAC_PI_8.cos(), FRAC_PI_8.sin(), 0.0));
+    let slope = [0.0; 4];
+    let eighth = [0.0, 0.0, sine, cosine];
+    let spline = [slope, still, slope, slope, eighth, slope, slope, still, slope];
+    // Half way between two unit quaternions is the direction of their mean.
+    assert_near(turned("CUBICSPLINE", &spline), DVec3::new(FRAC_PI_8.cos(), FRAC_PI_8.sin(), 0.0));
+    // A spline through zero, where there is no rotation: the key holds.
+    let back = [0.0, 0.0, 0.0, -1.0];
+    let spline = [slope, still, slope, slope, back, slope, slope, still, slope];
+    assert_near(turned("CUBICSPLINE", &spline), DVec3::X);
+}
+
+#[test]
+fn clips_repeat() {
+    let gltf = arm().load();
+    for (time, same) in [(2.0, 0.0), (2.5, 0.5), (-1.5, 0.5), (1e6 + 0.5, 0.5), (2.0 - 1e-9, 0.0)] {
+        assert_eq!(posed(&gltf, time), posed(&gltf, same), "{time}");
+    }
+    let mut file = triangle(json!([{ "mesh": 0 }]));
+    file.clip("moment", (0, "translation"), "LINEAR", &[0.0], &[[1.0; 3]]);
+    assert_eq!(posed(&file.load(), 5.0).positions[0], DVec3::ONE);
+}
+
+/// Two triangles that share an edge whose vertices are written twice.
+fn seam() -> File {
+    let mut file = File::new(json!([{ "mesh": 0 }]));
+    let corners = [
+        [0.0, 0.0, 0.0],
+        [1.0, 0.0, 0.0],
+        [0.0, 1.0, 0.0],
+        [1.0, 0.0, 0.0],
+        [1.0, 1.0, 0.0],
+        [-0.0, 1.0, 0.0],
+    ];
+    let positions = file.floats("VEC3", &corners);
+    let uvs = file.floats("VEC2", &[0, 1, 2, 3, 4, 5].map(|i| [i as f32, 0.25]));
+    let attributes = json!({ "POSITION": positions, "TEXCOORD_0": uvs });
+    file.add("meshes", json!({ "primitives": [{ "attributes": attributes }] }));
+    file
+}
+
+#[test]
+fn seams_are_welded_and_texture_coordinates_stay() {
+    let mut file = seam();
+    let mesh = file.load().mesh(None).unwrap();
+    assert_eq!(mesh.triangles, [[0, 1, 2], [1, 3, 2]]);
+    // v runs up.
+    assert_eq!(mesh.uvs[1], [3.0, 4.0, 5.0].map(|u| DVec2::new(u, 0.75)));
+    // What moves only one side keeps them apart.
+    let target = [[0.0; 3], [0.0; 3], [0.0; 3], [0.0, 0.0, 1.0], [0.0; 3], [0.0; 3]];
+    let target = file.floats("VEC3", &target);
+    file.root["meshes"][0]["primitives"][0]["targets"] = json!([{ "POSITION": target }]);
+    assert_eq!(file.load().mesh(None).unwrap().positions.len(), 5);
+}
+
+#[test]
+fn primitives_meshes_and_skins_are_welded() {
+    // The same triangles, each half in a primitive of its own.
+    let mut file = seam();
+    let mut primitive = file.root["meshes"][0]["primitives"][0].clone();
+    let (first, second) = (file.indices(&[0, 1, 2]), file.indices(&[3, 4, 5]));
+    file.root["meshes"][0]["primitives"][0]["indices"] = json!(first);
+    primitive["indices"] = json!(second);
+    let whole = seam().load().mesh(None).unwrap();
+    let mut two_primitives = file.clone();
+    let primitives = two_primitives.root["meshes"][0]["primitives"].as_array_mut().unwrap();
+    primitives.push(primitive.clone());
+    assert_eq!(two_primitives.load().mesh(None).unwrap(), whole);
+    // In a node of its own: together as long as no animation moves it.
+    file.add("meshes", json!({ "primitives": [primitive] }));
+    file.root["nodes"] =
+        json!([{ "children": [1, 2] }, { "mesh": 0 }, { "mesh": 1, "translation": [0, 0, 0] }]);
+    assert_eq!(file.load().mesh(None).unwrap(), whole);
+    file.clip("apart", (2, "translation"), "LINEAR", &[0.0, 1.0], &[[0.0; 3]; 2]);
+    assert_eq!(file.load().mesh(None).unwrap().positions.len(), 6);
+    // Two skins of the same joints.
+    let mut file = arm();
+    let skin = file.root["skins"][0].clone();
+    file.root["skins"].as_array_mut().unwrap().push(skin);
+    file.root["nodes"][0]["children"] = json!([1, 2, 4]);
+    file.add("nodes", json!({ "mesh": 0, "skin": 1 }));
+    assert_eq!(file.load().mesh(None).unwrap().positions.len(), 6);
+}
+
+#[test]
+fn strips_and_fans_face_as_triangles_do() {
+    let corners = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0, 1.0, 0.0], [0.0, 2.0, 0.0]];
+    let loaded = |mode: u32, indices: &[u8]| {
+        let mut file = File::new(json!([{ "mesh": 0 }]));
+        let positions = file.floats("VEC3", &corners);
+        let uvs = file.floats("VEC2", &[[0.0; 2]; 5]);
+        let indices = file.indices(indices);
+        let attributes = json!({ "POSITION": positions, "TEXCOORD_0": uvs });
+        let mut primitives = vec![json!({ "attributes": attributes, "indices": indices, "mode": mode })];
+        // Lines are nothing to extrude.
+        primitives.push(json!({ "attributes": attributes, "mode": 1 }));
+        file.add("meshes", json!({ "primitives": primitives }));
+        file.load().mesh(None).unwrap()
+    };
+    let triangles = loaded(4, &[0, 1, 2, 1, 3, 2, 2, 3, 4]);
+    assert_eq!(triangles.triangles.len(), 3);
+    assert_eq!(loaded(5, &[0, 1, 2, 3, 4]), triangles);
+    let fan = loaded(6, &[0, 1, 3, 4]);
+    assert_eq!(fan.triangles.len(), 2);
+    assert!(triangles.normals.iter().chain(&fan.normals).all(|normal| *normal == DVec3::Z));
+}
+
+#[test]
+fn a_mirrored_mesh_faces_outwards() {
+    let mut file = triangle(json!([{ "mesh": 0, "scale": [-1, 1, 1] }]));
+    let normals = file.floats("VEC3", &[[0.0, 0.0, 1.0]; 3]);
+    let mut with_normals = file.clone();
+    with_normals.root["meshes"][0]["primitives"][0]["attributes"]["NORMAL"] = json!(normals);
+    for mut file in [file, with_normals] {
+        for moves in [false, true] {
+            let mesh = file.load().mesh(None).unwrap();
+            assert_eq!(mesh.normals, [DVec3::Z; 3]);
+            assert_eq!(info(&mesh).triangles_against_normals, 0);
+            if !moves {
+                file.clip("move", (0, "translation"), "LINEAR", &[0.0], &[[0.0; 3]]);
+            }
+        }
+    }
+}
+
+#[test]
+fn integers_strides_and_extensions_of_them_are_read() {
+    let mut file = triangle(json!([{ "mesh": 0, "scale": [0.1, 0.1, 0.1] }]));
+    // Bytes, each position in four of them.
+    let positions = file.accessor("VEC3", 5120, 3, &[0, 0, 0, 9, 10, 0, 0, 9, 0, 10, 0, 9]);
+    let view = file.root["accessors"][positions]["bufferView"].as_u64().unwrap() as usize;
+    file.root["bufferViews"][view]["byteStride"] = json!(4);
+    let uvs = file.accessor("VEC2", 5123, 3, &[0, 0, 0, 0, 255, 255, 0, 0, 0, 0, 255, 255]);
+    file.root["accessors"][uvs]["normalized"] = json!(true);
+    file.root["meshes"][0]["primitives"][0]["attributes"] =
+        json!({ "POSITION": positions, "TEXCOORD_0": uvs, "_OWN": 0 });
+    file.root["extensionsRequired"] = json!(["KHR_mesh_quantization", "KHR_materials_unlit"]);
+    file.root["nodes"][0]["extras"] = json!(["of any kind"]);
+    let mesh = file.load().mesh(None).unwrap();
+    assert_near(mesh.positions[1], DVec3::X);
+    assert_eq!(mesh.uvs, [[DVec2::Y, DVec2::ONE, DVec2::ZERO]]);
+}
+
+/// A scene of this mesh section, and what makes it one.
+struct Animation(tempfile::TempDir);
+
+impl Animation {
+    fn new(mesh: &str) -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("fog.toml"), "recipe = \"fog\"\nsize = [2, 2, 2]\n").unwrap();
+        let text = format!(
+            "mesh = {{ {mesh} }}\nshell = {{ thickness = 0.1 }}\nvolume = {{ recipe = \"fog.toml\" }}\n\
+             timeline = {{ frames = 8, rate = 4 }}\n"
+        );
+        std::fs::write(folder.path().join("scene.toml"), text).unwrap();
+        Self(folder)
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+
+    fn write(&self, name: &str, bytes: &[u8]) {
+        std::fs::write(self.path(name), bytes).unwrap();
+    }
+
+    fn open(&self, keys: &[&str]) -> Result<Sequence, Error> {
+        let keys: Vec<String> = keys.iter().map(|&key| key.to_owned()).collect();
+        Sequence::open(&self.path("scene.toml"), &keys)
+    }
+
+    /// What is said of a scene that cannot be opened, with the advice.
+    fn refusal(&self, keys: &[&str]) -> String {
+        told(&self.open(keys).map(drop).unwrap_err())
+    }
+}
+
+fn at(sequence: &mut Sequence, frame: u32) -> Scene {
+    let Loaded { scene, .. } =
+        sequence.at(frame, &Silent, &|_| Ok(())).unwrap_or_else(|error| panic!("{error}"));
+    scene
+}
+
+#[test]
+fn a_scene_plays_a_clip_and_keeps_its_topology() {
+    let mut file = arm();
+    file.clip("rise", (2, "translation"), "LINEAR", &[0.0, 4.0], &[[0.0; 3], [0.0, 4.0, 0.0]]);
+    let animation = Animation::new("file = \"arm.glb\", clip = \"rise\", rate = 2");
+    animation.write("arm.glb", &file.binary());
+    let lowest =
+        |scene: &Scene| scene.shell.vertices.iter().map(|vertex| vertex.y).fold(f64::INFINITY, f64::min);
+    let mut sequence = animation.open(&[]).unwrap();
+    let first = at(&mut sequence, 1);
+    for frame in [3, 1, 8, 2] {
+        let scene = at(&mut sequence, frame);
+        // Four frames a second, a unit a second of the clip, two of those a second.
+        assert!((lowest(&scene) - 0.5 * f64::from(frame - 1)).abs() < 1e-12, "frame {frame}");
+        assert!(Arc::ptr_eq(&scene.shell.topology, &first.shell.topology));
+        let alone = at(&mut animation.open(&[]).unwrap(), frame);
+        assert_eq!(scene.shell.vertices, alone.shell.vertices, "frame {frame}");
+    }
+    let mut timed = animation.open(&["mesh.time=0.25"]).unwrap();
+    let [a, b] = [1, 5].map(|frame| at(&mut timed, frame));
+    assert_eq!(lowest(&a), 0.5);
+    assert!(Arc::ptr_eq(&a.shell, &b.shell), "a time of its own stands");
+    // The first one bends.
+    let bent = at(&mut animation.open(&["mesh.clip=bend"]).unwrap(), 3);
+    assert_eq!(lowest(&bent), 0.0);
+    assert_ne!(bent.shell.vertices, first.shell.vertices);
+
+    let refusal = animation.refusal(&["mesh.clip=fall"]);
+    assert!(refusal.contains("arm.glb has no animation \"fall\""), "{refusal}");
+    assert!(refusal.ends_with("those that it has: \"bend\", \"rise\""), "{refusal}");
+}
+
+#[test]
+fn the_command_line_lists_joints_and_animations() {
+    let animation = Animation::new("file = \"arm.glb\"");
+    animation.write("arm.glb", &arm().binary());
+    let told = |more: &[&str]| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_mesoshell"));
+        command.arg("mesh").arg("info").arg(animation.path("arm.glb")).args(more);
+        String::from_utf8(command.output().unwrap().stdout).unwrap()
+    };
+    let json: Value = serde_json::from_str(&told(&["--json"])).unwrap();
+    let counts =
+        ["positions", "triangles", "vertices", "joints", "morph_targets"].map(|key| json[key].as_u64());
+    assert_eq!(counts, [6, 4, 6, 2, 0].map(Some));
+    assert_eq!(json["clips"], json!([{ "name": "bend", "duration": 2.0 }]));
+    let text = told(&[]);
+    assert!(text.contains("  joints ") && text.contains("bend, 2 s"), "{text}");
+}
+
+#[test]
+fn what_does_not_move_is_kept() {
+    let animation = Animation::new("file = \"a.GLB\"");
+    animation.write("a.GLB", &triangle(json!([{ "mesh": 0 }])).binary());
+    let mut sequence = animation.open(&[]).unwrap();
+    let [a, b] = [2, 5].map(|frame| at(&mut sequence, frame));
+    assert!(Arc::ptr_eq(&a.shell, &b.shell));
+    for (key, part) in [
+        ("mesh.clip=walk", "has no animation \"walk\" -- those that it has: none"),
+        ("mesh.rate=2", "`rate` and `time` are for an animation, but"),
+        ("mesh.file=a.obj", "a.obj"),
+        ("mesh={file=\"a.obj\",clip=\"walk\"}", "`clip` is for a glTF file"),
+        ("mesh={file=\"a.obj\",time=1}", "`rate` and `time` are for a sequence of files"),
+        ("mesh={generator=\"torus\",clip=\"walk\"}", "unknown key `clip`"),
+    ] {
+        if let Err(error) = animation.open(&[key]) {
+            assert!(told(&error).contains(part), "{}", told(&error));
+        } else {
+            assert_eq!(part, "a.obj", "a mesh of another kind is read with its frame");
+        }
+    }
+    animation.write("a.1.glb", b"");
+    let refusal = animation.refusal(&["mesh.file=a.#.glb"]);
+    assert!(refusal.contains("a sequence is one of OBJ files"), "{refusal}");
+}
+
+#[test]
+fn missing_texture_coordinates_are_told_before_the_first_frame() {
+    let animation = Animation::new("file = \"a.glb\"");
+    let mut file = triangle(json!([{ "mesh": 0, "translation": [3, 0, 0] }]));
+    file.root["meshes"][0]["primitives"][0]["attributes"].as_object_mut().unwrap().remove("TEXCOORD_0");
+    animation.write("a.glb", &file.binary());
+    let refusal = animation.refusal(&[]);
+    assert!(refusal.contains("mesh 0, primitive 0: it has no texture coordinates"), "{refusal}");
+    assert!(refusal.contains("`projection`"), "{refusal}");
+    let projected = Gltf::load(animation.path("a.glb"), Some(&"planar-z".parse().unwrap())).unwrap();
+    assert_eq!(projected.mesh(None).unwrap().uvs, [[DVec2::ZERO, DVec2::X, DVec2::Y]]);
+    at(&mut animation.open(&["mesh.projection=planar-z"]).unwrap(), 1);
+}
+
+#[test]
+fn buffers_may_be_elsewhere_and_are_inputs() {
+    let file = arm();
+    let animation = Animation::new("file = \"arm.gltf\"");
+    animation.write("arm.gltf", &file.text("its%20data.bin"));
+    animation.write("its data.bin", &file.bytes);
+    let load = || Gltf::load(animation.path("arm.gltf"), None);
+    let expected = posed(&file.load(), 0.7);
+    assert_eq!(posed(&load().unwrap(), 0.7), expected);
+    let inputs = animation.open(&[]).unwrap().inputs(1).unwrap().files;
+    assert_eq!(inputs, ["arm.gltf", "fog.toml", "its data.bin"].map(|name| animation.path(name)));
+
+    animation.write("its data.bin", &file.bytes[1..]);
+    let refusal = told(&load().map(drop).unwrap_err());
+    assert!(refusal.contains("buffer 0 has") && refusal.contains("but should have"), "{refusal}");
+    std::fs::remove_file(animation.path("its data.bin")).unwrap();
+    let refusal = told(&load().map(drop).unwrap_err());
+    assert!(refusal.contains("its data.bin: cannot be read") && refusal.contains("buffer 0 of"), "{refusal}");
+    animation.write("arm.gltf", &file.text(&file.data_uri()));
+    assert_eq!(posed(&load().unwrap(), 0.7), expected);
+    // Behind a binary file, too.
+    let mut root = file.clone();
+    root.root["buffers"] = json!([{ "byteLength": file.bytes.len(), "uri": "far.bin" }]);
+    animation.write("arm.glb", &root.binary());
+    animation.write("far.bin", &file.bytes);
+    let inputs = animation.open(&["mesh.file=arm.glb"]).unwrap().inputs(1).unwrap().files;
+    assert!(inputs.contains(&animation.path("far.bin")), "{inputs:?}");
+}
+
+fn told(error: &Error) -> String {
+    let help = match error {
+        Error::Input { help, .. } | Error::Text { help, .. } | Error::Usage { help, .. } => help.as_deref(),
+        _ => None,
+    };
+    format!("{error} -- {}", help.unwrap_or_default())
+}
+
+/// A place in the text of [`arm`], what is written there, and a part of what is said of it.
+fn defects() -> Vec<(&'static str, Value, &'static str)> {
+    let ghost = u32::MAX;
+    vec![
+        ("/asset/version", json!("1.0"), "is of glTF 1.0"),
+        (
+            "/extensionsRequired",
+            json!(["KHR_draco_mesh_compression"]),
+            "needs the extension KHR_draco_mesh_compression",
+        ),
+        ("/scene", json!(7), "there is no scene 7"),
+        ("/scenes/0/nodes", json!([99]), "there is no node 99"),
+        ("/scenes/0/nodes", json!([]), "no triangle"),
+        ("/nodes/3/children", json!([2]), "both node 0 and node 3"),
+        ("/nodes/3/children", json!([0]), "is a descendant of itself"),
+        ("/nodes/3/children", json!([3]), "node 3 is a child of both"),
+        ("/nodes/3/children", json!([ghost]), "there is no node 4294967295"),
+        ("/nodes/3/rotation", json!([0, 0, 0, 0]), "node 3: its rotation is zero"),
+        (
+            "/nodes/3/matrix",
+            json!([1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]),
+            "it moves node 3, which has a matrix",
+        ),
+        ("/nodes/0/matrix", json!([1e300, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]), ""),
+        ("/nodes/0/scale", json!([1e38, 1e38, 1e38]), "1e32"),
+        ("/nodes/1/mesh", json!(1), "there is no mesh 1"),
+        ("/nodes/1/skin", json!(1), "there is no skin 1"),
+        ("/nodes/1/weights", json!([1]), "its 1 weights are not 0 finite numbers"),
+        ("/skins/0/joints", json!([2]), "names the joint 1, but there are 1"),
+        ("/skins/0/joints", json!([2, 3, 0]), "2 matrices for 3 joints"),
+        ("/skins/0/joints", json!([2, 44]), "there is no node 44"),
+        ("/meshes/0/primitives/0/mode", json!(9), "its mode is none"),
+        ("/meshes/0/primitives/0/mode", json!(0), "no triangle"),
+        ("/meshes/0/primitives/0/mode", json!(4), ""),
+        ("/meshes/0/primitives/0/attributes/POSITION", json!(99), "there is no accessor 99"),
+        (
+            "/meshes/0/primitives/0/attributes/POSITION",
+            json!(1),
+            "accessor 1: it holds elements of type Vec2",
+        ),
+        ("/meshes/0/primitives/0/attributes", json!({}), "it has no positions"),
+        ("/meshes/0/primitives/0/attributes/WEIGHTS_0", json!(3), ""),
+        ("/meshes/0/primitives/0/attributes/WEIGHTS_1", json!(3), ""),
+        ("/meshes/0/primitives/0/attributes/JOINTS_0", json!(2), "accessor 2: it names the joint"),
+        ("/meshes/0/primitives/0/indices", json!(2), "not of 1 numbers"),
+        ("/accessors/0/count", json!(5), "it holds 6 elements, but should hold 5"),
+        ("/accessors/0/count", json!(u64::MAX), "reach beyond the end of buffer view 0"),
+        ("/accessors/0/count", json!(1u64 << 60), "reach beyond the end of buffer view 0"),
+        ("/accessors/0/bufferView", json!(null), "it has no buffer view"),
+        ("/accessors/0/bufferView", json!(77), "there is no buffer view 77"),
+        ("/accessors/0/byteOffset", json!(4), "reach beyond the end of buffer view 0"),
+        ("/accessors/0/byteOffset", json!(u64::MAX), "reach beyond the end of buffer view 0"),
+        ("/accessors/0/componentType", json!(1), "its type is none"),
+        ("/accessors/0/type", json!("MAT2"), "not of 3 numbers"),
+        (
+            "/accessors/0/sparse",
+            json!({ "count": u64::MAX, "indices": { "bufferView": 0, "componentType": 5125 },
+            "values": { "bufferView": 0 } }),
+            "reach beyond the end",
+        ),
+        (
+            "/accessors/0/sparse",
+            json!({ "count": 2, "indices": { "bufferView": 2, "componentType": 5121 },
+            "values": { "bufferView": 0 } }),
+            "its sparse index 255 is not below 6",
+        ),
+        ("/bufferViews/0/byteLength", json!(u64::MAX), "buffer view 0 reaches beyond the end of buffer 0"),
+        ("/bufferViews/0/byteOffset", json!(u64::MAX), "buffer view 0 reaches beyond the end of buffer 0"),
+        ("/bufferViews/0/buffer", json!(3), "reaches beyond the end of buffer 3"),
+        ("/bufferViews/0/byteStride", json!(0), "a stride of 0 for elements of 12 bytes"),
+        ("/bufferViews/0/byteStride", json!(u64::MAX), "reach beyond the end of buffer view 0"),
+        ("/buffers", json!([{ "byteLength": 100000 }]), "but should have 100000"),
+        ("/buffers", json!([{ "byteLength": u64::MAX }]), "longer than 2048 MiB"),
+        ("/buffers", json!([{ "byteLength": 1 }]), "reaches beyond the end of buffer 0"),
+        ("/buffers", json!([{ "byteLength": 1 }, { "byteLength": 1 }]), "buffer 1 has neither"),
+        ("/buffers", json!([{ "byteLength": 1, "uri": "data:,x" }]), "not in base64"),
+        ("/buffers", json!([{ "byteLength": 1, "uri": "none.bin" }]), "none.bin: cannot be read"),
+        ("/animations/0/channels/0/sampler", json!(2), "there is no sampler 2"),
+        ("/animations/0/channels/0/target/node", json!(9), "there is no node 9"),
+        (
+            "/animations/0/channels/0/target/path",
+            json!("colour"),
+            "a path or an interpolation that there is not",
+        ),
+        ("/animations/0/channels/0/target/path", json!("weights"), "has no morph targets to weigh"),
+        ("/animations/0/channels/0/target/path", json!("scale"), "elements of type Vec4"),
+        ("/animations/0/samplers/0/interpolation", json!("CUBICSPLINE"), "but should hold 9"),
+        ("/animations/0/samplers/0/input", json!(0), "not of 1 numbers"),
+        ("/animations/0/samplers/0/output", json!(88), "there is no accessor 88"),
+    ]
+}
+
+#[test]
+fn every_defect_is_told() {
+    for (place, value, part) in defects() {
+        let mut file = arm();
+        let (parent, key) = place.rsplit_once('/').unwrap();
+        match file.root.pointer_mut(parent).unwrap() {
+            Value::Array(list) => list[key.parse::<usize>().unwrap()] = value,
+            object => object[key] = value,
+        }
+        match file.try_load() {
+            // Some are merely strange.
+            Ok(gltf) => assert!(part.is_empty() && gltf.mesh(None).is_ok(), "{place} should say {part}"),
+            Err(error) => {
+                let told = told(&error);
+                assert!(told.contains(part), "{place}: {told:?} should say {part:?}");
+                assert!(!told.ends_with("-- ") || part == "1e32", "{place}: {told:?} advises nothing");
+                assert!(told.contains("file.glb: ") || part.contains("none.bin"), "{told}");
+            }
+        }
+    }
+}
+
+#[test]
+fn numbers_that_are_none_are_told() {
+    for (offset, part) in [(0, "accessor 0: element 0 is [NaN, 0.0, 0.0]"), (72, "accessor 1: element 0")] {
+        let mut file = arm();
+        file.bytes[offset..offset + 4].copy_from_slice(&f32::NAN.to_le_bytes());
+        let told = told(&file.try_load().map(drop).unwrap_err());
+        assert!(told.contains(part), "{told}");
+    }
+    for times in [[1.0, 1.0], [-1.0, 0.0]] {
+        let mut file = arm();
+        file.clip("when", (2, "scale"), "LINEAR", &times, &[[1.0; 3]; 2]);
+        let told = told(&file.try_load().map(drop).unwrap_err());
+        assert!(told.contains("times of keys must ascend"), "{told}");
+    }
+    let mut file = arm();
+    file.clip("far", (2, "scale"), "LINEAR", &[0.0, 1.0], &[[1.0; 3], [f32::MAX; 3]]);
+    let gltf = file.load();
+    let error = gltf.mesh(Some(gltf.pose(1, 0.5))).unwrap_err().to_string();
+    assert!(error.contains("0.5 s into \"far\": position"), "{error}");
+    // Nothing is left of it, and so no normal: it has those at rest.
+    file.clip("gone", (2, "scale"), "LINEAR", &[0.0, 1.0], &[[1.0; 3], [-1.0; 3]]);
+    let gltf = file.load();
+    assert_eq!(gltf.mesh(Some(gltf.pose(2, 0.5))).unwrap().normals, [DVec3::Z; 6]);
+}
+
+#[test]
+fn a_short_file_cannot_ask_for_much() {
+    // Any number of morph targets, all of which are the same.
+    let mut file = triangle(json!([{ "mesh": 0 }]));
+    let count = 1000;
+    let positions = file.floats("VEC3", &vec![[0.0; 3]; count]);
+    let primitive = json!({ "attributes": { "POSITION": positions, "TEXCOORD_0": file.floats("VEC2", &vec![[0.0; 2]; count]) } });
+    file.root["meshes"][0]["primitives"][0] = primitive;
+    file.root["meshes"][0]["primitives"][0]["targets"] =
+        json!(vec![json!({ "POSITION": positions }); 30_000]);
+    assert!(told(&file.try_load().map(drop).unwrap_err()).contains("holds more than"));
+    // A chain of nodes, all of which are roots of the scene.
+    let many = 100_000;
+    let mut file = triangle(json!([]));
+    file.root["nodes"] = (0..many).map(|id| json!({ "children": [id + 1] })).collect();
+    file.add("nodes", json!({ "mesh": 0 }));
+    file.root["scenes"][0]["nodes"] = (0..many).collect();
+    assert_eq!(file.load().mesh(None).unwrap().triangles.len(), 1);
+}
+
+#[test]
+fn every_truncation_is_an_error() {
+    let whole = arm().binary();
+    load(&whole).unwrap();
+    for end in 0..whole.len() {
+        let error = load(&whole[..end]).map(drop).unwrap_err();
+        assert!(matches!(error, Error::Input { .. }), "{error:?}");
+        assert!(end < 12 || error.to_string().contains(": has "), "{error}");
+    }
+    // With the length that it has.
+    for end in 12..whole.len() {
+        let mut cut = whole[..end].to_vec();
+        cut[8..12].copy_from_slice(&(end as u32).to_le_bytes());
+        assert!(load(&cut).is_err(), "{end} bytes");
+    }
+    assert!(Gltf::load(Path::new("no-such.glb"), None).is_err());
+}
+
+#[test]
+fn any_byte_may_be_wrong() {
+    let whole = arm().binary();
+    let mut random = rand_pcg::Pcg64Mcg::seed_from_u64(7);
+    let mut loaded = 0;
+    for _ in 0..20_000 {
+        let mut spoilt = whole.clone();
+        for _ in 0..random.random_range(1..4) {
+            let at = random.random_range(0..spoilt.len());
+            spoilt[at] = random.random_range(0..=255u8);
+        }
+        if let Ok(gltf) = load(&spoilt) {
+            loaded += 1;
+            let poses = (0..gltf.clips().len()).map(|clip| Some(gltf.pose(clip, 0.7)));
+            poses.chain([None]).for_each(|pose| drop(gltf.mesh(pose)));
+        }
+    }
+    assert!(loaded > 1000, "{loaded} of 20000 are still meshes");
+}
