@@ -3,7 +3,8 @@
 //! The volume of a tetrahedron, in parts of a third of its triangle's area times the length of the edge that stands on the triangle, is
 //! 1 in a shell of parallel prisms, and falls below 0 where the shell folds. As the thickness goes to 0 it tends to the cosine between the
 //! triangle's normal and one of the directions of extrusion, so that a shell whose directions all leave its triangles on the outer side
-//! is sound if it is only thin enough.
+//! is sound if it is only thin enough. Where a direction leaves a triangle on the inner side no thickness helps, and nothing is lowered
+//! for that triangle's sake.
 //!
 //! All vertices of a prism that has less than [`LEAST`] are lowered by the factor [`STEP`], and after each round no vertex is left
 //! more than [`STEEPEST`] times as thick as a neighbour; until no prism has less. Where nothing is lowered, nothing is changed.
@@ -24,7 +25,7 @@ const STEP: f64 = 0.9;
 /// How much thicker a vertex may be than its neighbour.
 const STEEPEST: f64 = 1.3;
 
-/// After so many rounds a vertex is 1e-9 of what it was: its direction lies below a triangle, and no thickness helps.
+/// After so many rounds a vertex is 1e-9 of what it was: that a shell folds there all the same is rounding.
 const ROUNDS: usize = 200;
 
 /// Triangles that one task of the thread pool takes at least.
@@ -46,8 +47,8 @@ pub(super) fn factors(
             let normal = area_vector(ids.map(|id| mesh.positions[id]));
             let area = normal.length();
             let cosine = ids.iter().map(|&id| normal.dot(directions[id]) / area).fold(1.0, f64::min);
-            // A triangle without an area has nothing to lose.
-            if area == 0.0 {
+            // A triangle without an area has nothing to lose; one that a direction leaves on its inner side folds at any thickness.
+            if area == 0.0 || cosine <= 0.0 {
                 return false;
             }
             let vertex = |id: u32| {
@@ -60,7 +61,7 @@ pub(super) fn factors(
                 let height =
                     outer.map_or(0.0, |id| factors[(id - base) as usize] * full((id - base) as usize));
                 let corners = ids.map(|id| if id < base { mesh.positions[id as usize] } else { vertex(id) });
-                height > 0.0 && determinant(corners) <= LEAST * cosine.max(0.0) * area * height
+                height > 0.0 && determinant(corners) <= LEAST * cosine * area * height
             })
         };
         let short: Vec<usize> = (0..mesh.triangles.len())
@@ -125,6 +126,16 @@ mod tests {
             .min_by(|&a, &b| mesh.positions[a].x.total_cmp(&mesh.positions[b].x))
             .unwrap();
         assert!((thickness(outermost) - 0.5).abs() < 1e-12);
+    }
+
+    #[test]
+    fn what_no_thickness_mends_takes_nothing_from_the_rest() {
+        let mut mesh = Generator::Sphere(Sphere { radius: 1.0, segments: 24, rings: 12 }).build().unwrap();
+        mesh.normals[100] = -mesh.normals[100];
+        let shell = Shell::build(&mesh, &limited(0.2)).unwrap();
+        assert!(shell.health.inverted > 0, "it is turned inside out there, however thin");
+        let least = shell.limit.map_or(1.0, |limit| limit.least);
+        assert!(least > 0.1, "{least}");
     }
 
     #[test]

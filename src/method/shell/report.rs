@@ -76,8 +76,13 @@ impl Shell {
         }
         if health.inverted > 0 {
             report.warnings.push(format!(
-                "{} of {} tetrahedra are inverted: the shell folds; make it thinner, smooth its directions, or let it give way by shell.limit = \"safe\"",
-                health.inverted, health.tetrahedra
+                "{} of {} tetrahedra are inverted: the shell folds; {}",
+                health.inverted,
+                health.tetrahedra,
+                match self.scene.shell.limit {
+                    Some(_) => "no thickness helps there: smooth its directions by shell.smoothing, or mend the mesh",
+                    None => "make it thinner, smooth its directions, or let it give way by shell.limit = \"safe\"",
+                }
             ));
         }
         let wanted = wanted_samples(self.scene.march, self.texels);
