@@ -5,7 +5,7 @@ mod common;
 
 use std::f64::consts::PI;
 use std::path::Path;
-use std::sync::{Arc, OnceLock};
+use std::sync::Arc;
 
 use common::Watched;
 use glam::{DMat3, DQuat, DVec2, DVec3};
@@ -381,8 +381,8 @@ fn a_mirrored_world_looks_mirrored() {
             topology.corners[t].swap(2, 3);
             Arc::make_mut(&mut shell_of.texture)[t].swap(2, 3);
         }
-        shell_of.maps = OnceLock::new();
         shell_of.topology = Arc::new(topology);
+        shell_of.measure();
         for vector in [&mut mirrored.view.camera.eye, &mut mirrored.view.camera.target] {
             *vector = flip(*vector);
         }

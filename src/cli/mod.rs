@@ -119,12 +119,16 @@ fn table<'a>(rows: impl IntoIterator<Item = (&'a str, String)>) -> String {
 /// that has just fallen asleep for them, and take turns on it while the other stands idle: CPU stages then take twice as long.
 fn start_threads() {
     let cores = core_affinity::get_core_ids().unwrap_or_default();
-    let asked = std::env::var_os("RAYON_NUM_THREADS").is_some();
     let mut pool = rayon::ThreadPoolBuilder::new();
-    if !asked && !cores.is_empty() {
+    // Where fewer are asked for, or allowed, the system knows better which.
+    let is_asked = std::env::var_os("RAYON_NUM_THREADS").is_some();
+    if !is_asked && std::thread::available_parallelism().is_ok_and(|allowed| allowed.get() == cores.len()) {
         pool = pool.num_threads(cores.len()).start_handler(move |thread| {
             core_affinity::set_for_current(cores[thread]);
         });
     }
-    pool.build_global().expect("no pool has been made yet");
+    if let Err(error) = pool.build_global() {
+        // Work that is parallel then starts the pool by itself, or says why it cannot.
+        output::complain(&format!("warning: no thread could be started for each core: {error}"));
+    }
 }

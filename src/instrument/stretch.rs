@@ -18,7 +18,7 @@ use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 use serde::Serialize;
 
-use crate::shell::Shell;
+use crate::shell::{Cell, Shell};
 
 /// Of a frame, against the frame at rest.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -44,10 +44,9 @@ pub struct Stretch {
 /// The singular values of the deformation gradient of each tetrahedron, descending; `None` where there is no such gradient.
 /// The shells have one topology.
 pub fn deformations(rest: &Shell, now: &Shell) -> Vec<Option<[f64; 3]>> {
-    (0..rest.topology.tetrahedra.len())
-        .into_par_iter()
-        .map(|t| gradient(rest, now, t).map(singular_values))
-        .collect()
+    let maps = rest.cells();
+    let of_one = |(t, maps): (usize, &Cell)| gradient(rest, maps, now, t).map(singular_values);
+    maps.par_iter().enumerate().map(of_one).collect()
 }
 
 impl Stretch {
@@ -100,7 +99,7 @@ fn shear([first, _, last]: [f64; 3]) -> f64 {
     if a > 0.0 { ((a - b) / (a + b)).asin() } else { 0.0 }
 }
 
-fn gradient(rest: &Shell, now: &Shell, t: usize) -> Option<DMat3> {
+fn gradient(rest: &Shell, maps: &Cell, now: &Shell, t: usize) -> Option<DMat3> {
     if !rest.has_maps(t) {
         return None;
     }
@@ -108,12 +107,11 @@ fn gradient(rest: &Shell, now: &Shell, t: usize) -> Option<DMat3> {
     let [before, after] = [rest, now].map(|shell| self::edges(shell.texture[t]));
     // Coordinates are told to some 1e-16 of their size, which is that of the texture's whole turns.
     let size = 1.0 + after.to_cols_array().into_iter().map(f64::abs).fold(0.0, f64::max);
-    let barycentric_from_world =
-        DMat3::from_cols_array_2d(&[1, 2, 3].map(|k| rest.cells()[t].gradients[k].to_array()));
+    let barycentric_from_world = DMat3::from_cols_array_2d(&[1, 2, 3].map(|k| maps.gradients[k].to_array()));
     let material = if before.abs_diff_eq(after, 1e-12 * size) {
         barycentric_from_world.transpose()
     } else {
-        after.inverse() * rest.cells()[t].texture_from_world
+        after.inverse() * maps.texture_from_world
     };
     let gradient = edges * material;
     gradient.is_finite().then_some(gradient)

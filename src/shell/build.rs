@@ -47,8 +47,7 @@ impl Shell {
             health: Health::default(),
             limit: None,
         };
-        let faults = shell.measure();
-        shell.health = health::health(&shell.topology, faults, 0);
+        shell.measure();
         shell
     }
 
@@ -124,13 +123,19 @@ impl Shell {
             self.uvs = Arc::new(uvs);
         }
 
-        let faults = self.measure();
+        let faults = self.faults();
         let overlap = health::overlap_risk_vertices(mesh, options, &directions);
         self.health = health::health(&self.topology, faults, overlap);
     }
 
-    /// Finds the volume of every tetrahedron; what maps there were are forgotten.
-    fn measure(&mut self) -> health::Faults {
+    /// Finds the volume of every tetrahedron after vertices or texture coordinates were changed; what maps there were are forgotten.
+    pub fn measure(&mut self) {
+        let faults = self.faults();
+        self.health = health::health(&self.topology, faults, self.health.overlap_risk_vertices);
+    }
+
+    /// As [`Shell::measure`].
+    fn faults(&mut self) -> health::Faults {
         self.maps = OnceLock::new();
         let (topology, vertices) = (&*self.topology, &*self.vertices);
         self.determinants.resize(topology.tetrahedra.len(), 0.0);

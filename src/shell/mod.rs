@@ -127,8 +127,9 @@ pub struct Shell {
     /// Six times the signed volume of each tetrahedron, in cubic world units, with the exact sign: negative where it is inverted. Zero
     /// also where it has a volume so near zero that its maps would not be finite.
     pub determinants: Vec<f64>,
-    /// See [`Shell::cells`], which makes them when they are first needed.
-    pub maps: OnceLock<Vec<Cell>>,
+    /// See [`Shell::cells`], which makes them when they are first needed: whoever changes any of the above afterwards must
+    /// [`measure`](Shell::measure) the shell anew.
+    maps: OnceLock<Vec<Cell>>,
     /// What `texture` was made from: the transformed UVs of each triangle.
     uvs: Arc<Vec<[DVec2; 3]>>,
     /// Counted when the shell was built.

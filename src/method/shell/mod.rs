@@ -164,8 +164,12 @@ impl Method for Shell {
     fn render(&mut self, view: &View) -> Result<Frame> {
         let mut watch = Stopwatch::start();
         self.interrupt.check()?;
-        let is_same_sight =
-            |last: &Last| last.view == *view && Arc::ptr_eq(&last.vertices, &self.scene.shell.vertices);
+        let walks = self.walks();
+        let is_same_sight = |last: &Last| {
+            last.view == *view
+                && Arc::ptr_eq(&last.vertices, &self.scene.shell.vertices)
+                && matches!(last.sight, Sight::Walked(_)) == walks
+        };
         let mut kept = std::mem::take(&mut self.kept);
         let mut spare = None;
         let (sight, seen) = match self.last.take() {
@@ -175,7 +179,7 @@ impl Method for Shell {
             }
             last => {
                 spare = last.and_then(|last| last.seen);
-                let sight = match self.walks() {
+                let sight = match walks {
                     true => {
                         self.progress.stage("finding where rays enter");
                         let ways = ways(&mut self.ways, &self.scene.shell);

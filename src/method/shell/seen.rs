@@ -71,7 +71,7 @@ pub struct Seen {
     pub tiles: Vec<Tile>,
     /// Front to back; every tetrahedron that is seen is in one.
     pub runs: Vec<Run>,
-    /// Tetrahedra that can be seen.
+    /// Tetrahedra that can be seen; where rays walk, all that have a volume.
     pub count: u64,
     /// Tetrahedra before the near plane.
     pub before_near: u64,
@@ -312,7 +312,9 @@ impl<'a> Eye<'a> {
         ];
         let per_unit = self.unit.recip();
         cell.planes = std::array::from_fn(|k| {
-            let normal = areas[k] * areas[k].length_squared().sqrt().recip().copysign(determinant);
+            let area = areas[k].length_squared().sqrt();
+            let inwards = if area > 0.0 { area.recip().copysign(determinant) } else { 0.0 };
+            let normal = areas[k] * inwards;
             let on_face = positions[usize::from(k == 0)];
             normal.as_vec3().extend((normal.dot(on_face) * per_unit) as f32).into()
         });

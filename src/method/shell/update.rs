@@ -82,7 +82,6 @@ impl Shell {
         if let Some(last) = &mut self.last
             && (model(before) != model(&scene)
                 || before.medium.lod_footprint != scene.medium.lod_footprint
-                || before.traversal != scene.traversal
                 || size != before.volume.levels[0].size
                 || scene.volume.levels.len() != before.volume.levels.len())
         {
