@@ -33,7 +33,8 @@ void begin_at(uint place, vec3 ray) {
 void main() {
     int next;
     int last;
-    if (!entries_of_pixel(next, last)) discard;
+    entries_of_pixel(true, next, last);
+    if (next == last) discard;
     vec3 ray = pixel_ray();
     float per_depth = length(ray) * view.per_opacity_distance;
 #ifdef SOLIDS

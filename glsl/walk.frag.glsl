@@ -20,8 +20,8 @@ layout(location = 1) out vec4 out_depth; // (distance * alpha, 0, 0, alpha)
 void main() {
     int next;
     int last;
-    bool is_intricate = entries_of_pixel(next, last);
-    if (next == last || is_intricate) discard;
+    entries_of_pixel(false, next, last);
+    if (next == last) discard;
     vec3 ray = pixel_ray();
     float per_depth = length(ray) * view.per_opacity_distance;
 #ifdef SOLIDS

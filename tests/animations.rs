@@ -29,12 +29,6 @@ fn scene(sequence: &mut Sequence, frame: u32) -> Arc<Scene> {
     Arc::new(loaded.unwrap_or_else(|error| panic!("frame {frame}: {error}")).scene)
 }
 
-/// Of its pictures, in pixels.
-fn size(path: &Path) -> [u32; 2] {
-    let view = scene(&mut open(path, &[]), 1).view;
-    [view.width, view.height]
-}
-
 /// Along the rays of all pixels of a small picture.
 #[test]
 fn no_frame_has_a_violation_of_its_order() {
@@ -61,12 +55,11 @@ fn no_frame_has_a_violation_of_its_order() {
     }
 }
 
-/// At half the size and the scene's own quality, within the bounds of still scenes (`tests/accuracy.rs`).
+/// At the scene's own size and quality, within the bounds of still scenes (`tests/accuracy.rs`).
 #[test]
 fn frames_look_as_the_reference_does() {
     for path in paths() {
-        let [width, height] = size(&path).map(|side| side / 2);
-        let mut sequence = open(&path, &[&format!("image.size=[{width}, {height}]")]);
+        let mut sequence = open(&path, &[]);
         let mut shell: Option<Watched> = None;
         let mut last = None;
         for frame in [1, 30, 60] {

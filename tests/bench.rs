@@ -128,8 +128,9 @@ fn a_sweep_is_measured_written_and_documented() {
     let columns: Vec<&str> = csv.lines().next().unwrap().split(',').collect();
     assert_eq!(csv.lines().count(), 1 + 2 * 4);
     assert!(csv.lines().all(|line| line.split(',').count() == columns.len()), "{csv}");
+    let points = results.scenes.iter().flat_map(|scene| &scene.points);
     let stages: Vec<String> =
-        results.scenes[0].points[0].stages.iter().map(|s| format!("{}_ms", s.name)).collect();
+        points.flat_map(|point| &point.stages).map(|stage| format!("{}_ms", stage.name)).collect();
     let columns = columns.iter().filter(|column| !stages.iter().any(|stage| stage == *column));
     for key in found.iter().map(String::as_str).chain(columns.copied()) {
         assert!(documentation.contains(&format!("`{key}`")), "`{key}` is not documented");

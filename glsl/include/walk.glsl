@@ -36,13 +36,14 @@ void planes_of(uint cell, out vec4 planes[4]) {
     for (int i = 0; i < 4; i++) planes[i] = texelFetch(cells, int(cell * 9) + 2 + i);
 }
 
-// The entries of this pixel, from `next` to before `last`; whether they are of an intricate ray.
-bool entries_of_pixel(out int next, out int last) {
+// The entries of this pixel, from `next` to before `last`: none, unless its ray is as intricate as asked. Where several pixels run at
+// once, those that are discarded may run on with the others: without entries they soon stop.
+void entries_of_pixel(bool intricate, out int next, out int last) {
     int pixel = int(gl_FragCoord.y) * int(2.0 * view.centre.x) + int(gl_FragCoord.x);
     uint begin = texelFetch(firsts, pixel).x;
     next = int(begin & ~INTRICATE);
     last = int(texelFetch(firsts, pixel + 1).x & ~INTRICATE);
-    return (begin & INTRICATE) != 0;
+    if (((begin & INTRICATE) != 0) != intricate) last = next;
 }
 
 float depth_at(uint place, vec3 ray) {

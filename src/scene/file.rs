@@ -489,7 +489,7 @@ recipe = "fog.toml"
                 found += 1;
             }
         }
-        assert_eq!(found, 8 + 12 + 6 + 3 + 3 + 10 + 2 + 3);
+        assert_eq!(found, 8 + 12 + 6 + 3 + 4 + 10 + 2 + 3);
         let text = Text::new("keys", "[mesh]\nfile = \"a.glb\"\nunknown_key = 1".to_owned(), &[]).unwrap();
         let message = text.parse::<SceneFile>(("mesh", "generator")).unwrap_err().to_string();
         let (_, documented) = DOCUMENTATION.split_once("\n## `[mesh]`").unwrap();
