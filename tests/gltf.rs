@@ -588,6 +588,10 @@ fn buffers_may_be_elsewhere_and_are_inputs() {
     assert_eq!(posed(&load().unwrap(), 0.7), expected);
     let inputs = animation.open(&[]).unwrap().inputs(1).unwrap().files;
     assert_eq!(inputs, ["arm.gltf", "fog.toml", "its data.bin"].map(|name| animation.path(name)));
+    // Behind a byte-order mark, too.
+    animation.write("arm.gltf", &[b"\xef\xbb\xbf", &file.text("its%20data.bin")[..]].concat());
+    assert_eq!(posed(&load().unwrap(), 0.7), expected);
+    assert_eq!(animation.open(&[]).unwrap().inputs(1).unwrap().files, inputs);
 
     animation.write("its data.bin", &file.bytes[1..]);
     let refusal = told(&load().map(drop).unwrap_err());
@@ -597,7 +601,7 @@ fn buffers_may_be_elsewhere_and_are_inputs() {
     assert!(refusal.contains("its data.bin: cannot be read") && refusal.contains("buffer 0 of"), "{refusal}");
     animation.write("arm.gltf", &file.text(&file.data_uri()));
     assert_eq!(posed(&load().unwrap(), 0.7), expected);
-    // Behind a binary file, too.
+    // And beside a binary file.
     let mut root = file.clone();
     root.root["buffers"] = json!([{ "byteLength": file.bytes.len(), "uri": "far.bin" }]);
     animation.write("arm.glb", &root.binary());

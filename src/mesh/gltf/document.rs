@@ -47,8 +47,7 @@ impl Document {
         let bytes = input::bytes(path, LONGEST_FILE)
             .map_err(|error| Error::input(path, format!("cannot be read: {error}")))?;
         let (json, chunk) = if bytes.starts_with(MAGIC) { binary(path, &bytes)? } else { (&bytes[..], None) };
-        let json = json.strip_prefix(b"\xef\xbb\xbf").unwrap_or(json);
-        let root: Root = json::deserialize::from_slice(json)
+        let root: Root = json::deserialize::from_slice(without_mark(json))
             .map_err(|error| damaged(path, format!("is not a readable glTF file: {error}")))?;
         check_kind(path, &root)?;
         let mut left = LONGEST_FILE;
@@ -119,7 +118,7 @@ pub fn named_files(path: &Path) -> Vec<PathBuf> {
     struct Buffer {
         uri: Option<String>,
     }
-    let named: Option<Named> = json_of(path).and_then(|json| serde_json::from_slice(&json).ok());
+    let named: Option<Named> = json_of(path).and_then(|json| serde_json::from_slice(without_mark(&json)).ok());
     let uris = named.into_iter().flat_map(|named| named.buffers).filter_map(|buffer| buffer.uri);
     uris.filter(|uri| !is_data(uri)).map(|uri| beside(path, &uri)).collect()
 }
@@ -138,6 +137,11 @@ fn json_of(path: &Path) -> Option<Vec<u8>> {
     };
     file.take(rest.min(LONGEST_FILE)).read_to_end(&mut json).ok()?;
     Some(json)
+}
+
+/// Without the byte-order mark that some editors put before a text.
+fn without_mark(json: &[u8]) -> &[u8] {
+    json.strip_prefix(b"\xef\xbb\xbf").unwrap_or(json)
 }
 
 fn damaged(path: &Path, message: impl Into<String>) -> Error {
