@@ -447,6 +447,23 @@ fn integers_strides_and_extensions_of_them_are_read() {
     assert_eq!(mesh.uvs, [[DVec2::Y, DVec2::ONE, DVec2::ZERO]]);
 }
 
+#[test]
+fn texture_coordinates_that_must_be_transformed_are_told() {
+    let mut file = triangle(json!([{ "mesh": 0 }]));
+    file.root["extensionsUsed"] = json!(["KHR_texture_transform"]);
+    file.load();
+    file.root["extensionsRequired"] = json!(["KHR_texture_basisu", "KHR_texture_transform"]);
+    let refusal = told(&file.try_load().map(drop).unwrap_err());
+    assert!(
+        refusal.contains("need the extension KHR_texture_transform") && refusal.contains("`projection`"),
+        "{refusal}"
+    );
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("file.glb");
+    std::fs::write(&path, file.binary()).unwrap();
+    Gltf::load(path, Some(&"planar-z".parse().unwrap())).unwrap();
+}
+
 /// A scene of this mesh section, and what makes it one.
 struct Animation(tempfile::TempDir);
 
@@ -627,6 +644,11 @@ fn defects() -> Vec<(&'static str, Value, &'static str)> {
             "/extensionsRequired",
             json!(["KHR_draco_mesh_compression"]),
             "needs the extension KHR_draco_mesh_compression",
+        ),
+        (
+            "/extensionsRequired",
+            json!(["KHR_texture_procedurals"]),
+            "needs the extension KHR_texture_procedurals",
         ),
         ("/scene", json!(7), "there is no scene 7"),
         ("/scenes/0/nodes", json!([99]), "there is no node 99"),

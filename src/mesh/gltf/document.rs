@@ -26,9 +26,18 @@ const MAGIC: &[u8] = b"glTF";
 /// Of the header, with the head of the first chunk.
 const GLB_HEAD: usize = 20;
 
-/// What a reader need not know to find the triangles, or what is known.
-const EXTENSIONS: [&str; 5] =
-    ["KHR_materials_", "KHR_texture_", "EXT_texture_", "KHR_lights_punctual", "KHR_mesh_quantization"];
+/// What a reader need not know to find the triangles, or what is known: beginnings of names.
+const EXTENSIONS: [&str; 6] = [
+    "KHR_materials_",
+    "KHR_texture_basisu",
+    TEXTURE_TRANSFORM,
+    "EXT_texture_",
+    "KHR_lights_punctual",
+    "KHR_mesh_quantization",
+];
+
+/// Moves texture coordinates, but by the material: where it is needed, those of the file alone are of no use.
+const TEXTURE_TRANSFORM: &str = "KHR_texture_transform";
 
 /// A file that was read.
 pub(super) struct Document {
@@ -82,6 +91,20 @@ impl Document {
         damaged(&self.path, message)
     }
 
+    /// # Errors
+    /// [`Error::Input`] where texture coordinates, as they are stored, are not those that are meant.
+    pub fn check_uvs(&self) -> Result<()> {
+        if !self.root.extensions_required.iter().any(|name| name == TEXTURE_TRANSFORM) {
+            return Ok(());
+        }
+        let message =
+            format!("its texture coordinates need the extension {TEXTURE_TRANSFORM}, which is not supported");
+        Err(Error::input(&self.path, message).with_help(
+            "export it with texture coordinates in floating point and without that extension, or set `projection` under `[mesh]` \
+             in the scene",
+        ))
+    }
+
     /// What an index stands for.
     ///
     /// # Errors
@@ -118,7 +141,8 @@ pub fn named_files(path: &Path) -> Vec<PathBuf> {
     struct Buffer {
         uri: Option<String>,
     }
-    let named: Option<Named> = json_of(path).and_then(|json| serde_json::from_slice(without_mark(&json)).ok());
+    let named: Option<Named> =
+        json_of(path).and_then(|json| serde_json::from_slice(without_mark(&json)).ok());
     let uris = named.into_iter().flat_map(|named| named.buffers).filter_map(|buffer| buffer.uri);
     uris.filter(|uri| !is_data(uri)).map(|uri| beside(path, &uri)).collect()
 }

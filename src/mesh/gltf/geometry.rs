@@ -183,7 +183,10 @@ impl Builder<'_> {
         let first = self.sources.len() as u32;
         let uvs = match attribute(Semantic::TexCoords(0)) {
             _ if !self.base.needs_uvs => None,
-            Some(uvs) => Some(document.numbers::<2>(uvs, Some(count))?),
+            Some(uvs) => {
+                document.check_uvs()?;
+                Some(document.numbers::<2>(uvs, Some(count))?)
+            }
             None => {
                 let message = "it has no texture coordinates, and a shell texture needs them";
                 return Err(document.error(message).with_help(projection::ADVICE));
