@@ -293,6 +293,25 @@ fn values_between_keys() {
 }
 
 #[test]
+fn channels_that_move_no_node_are_ignored() {
+    let mut file = arm();
+    let expected = posed(&file.load(), 0.7);
+    let channels = file.root["animations"][0]["channels"].as_array_mut().unwrap();
+    let pointer = json!({ "KHR_animation_pointer": { "pointer": "/materials/0/alphaCutoff" } });
+    for target in [
+        json!({ "path": "translation" }),
+        json!({ "path": "pointer", "extensions": pointer }),
+        json!({ "path": "pointer", "node": 3, "extensions": pointer }),
+    ] {
+        channels.push(json!({ "sampler": 0, "target": target }));
+    }
+    assert_eq!(posed(&file.load(), 0.7), expected);
+    file.root["animations"][0]["channels"].as_array_mut().unwrap().remove(0);
+    let gltf = file.load();
+    assert_eq!((gltf.clips()[0].duration, posed(&gltf, 0.7)), (0.0, gltf.mesh(None).unwrap()));
+}
+
+#[test]
 fn rotations_go_the_shorter_way_and_stay_rotations() {
     let (sine, cosine) = FRAC_PI_8.sin_cos();
     let [sine, cosine] = [sine, cosine].map(|x| x as f32);

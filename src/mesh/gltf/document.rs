@@ -9,8 +9,9 @@ use std::path::{Path, PathBuf};
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD_NO_PAD;
-use gltf::json::{self, Index, Root, root::Get};
+use gltf::json::{Index, Root, root::Get};
 use serde::Deserialize;
+use serde_json::Value;
 
 use crate::{Error, Result, input};
 
@@ -56,7 +57,7 @@ impl Document {
         let bytes = input::bytes(path, LONGEST_FILE)
             .map_err(|error| Error::input(path, format!("cannot be read: {error}")))?;
         let (json, chunk) = if bytes.starts_with(MAGIC) { binary(path, &bytes)? } else { (&bytes[..], None) };
-        let root: Root = json::deserialize::from_slice(without_mark(json))
+        let root = root_of(without_mark(json))
             .map_err(|error| damaged(path, format!("is not a readable glTF file: {error}")))?;
         check_kind(path, &root)?;
         let mut left = LONGEST_FILE;
@@ -166,6 +167,23 @@ fn json_of(path: &Path) -> Option<Vec<u8>> {
 /// Without the byte-order mark that some editors put before a text.
 fn without_mark(json: &[u8]) -> &[u8] {
     json.strip_prefix(b"\xef\xbb\xbf").unwrap_or(json)
+}
+
+/// Without channels that move no node, which are to be ignored, or (`KHR_animation_pointer`) something that is not read.
+fn root_of(json: &[u8]) -> serde_json::Result<Root> {
+    let mut root: Value = serde_json::from_slice(json)?;
+    let animations = root.get_mut("animations").and_then(Value::as_array_mut);
+    for animation in animations.into_iter().flatten() {
+        if let Some(channels) = animation.get_mut("channels").and_then(Value::as_array_mut) {
+            channels.retain(|channel| {
+                let target = |key| channel.get("target").and_then(|target| target.get(key));
+                channel.get("target").is_none()
+                    || target("node").is_some_and(|node| !node.is_null())
+                        && target("path").is_none_or(|path| path != "pointer")
+            });
+        }
+    }
+    serde_json::from_value(root)
 }
 
 fn damaged(path: &Path, message: impl Into<String>) -> Error {
