@@ -553,6 +553,20 @@ fn a_scene_plays_a_clip_and_keeps_its_topology() {
     let refusal = animation.refusal(&["mesh.clip=fall"]);
     assert!(refusal.contains("arm.glb has no animation \"fall\""), "{refusal}");
     assert!(refusal.ends_with("those that it has: \"bend\", \"rise\""), "{refusal}");
+
+    // By its number, too, unless another is called that; but not by the name of several.
+    let lowest_with = |key: &str| lowest(&at(&mut animation.open(&[key]).unwrap(), 3));
+    assert_eq!([lowest_with("mesh.clip='1'"), lowest_with("mesh.clip='2'")], [0.0, 1.0]);
+    file.root["animations"][0]["name"] = json!("rise");
+    animation.write("arm.glb", &file.binary());
+    let refusal = animation.refusal(&[]);
+    assert!(refusal.contains("arm.glb has 2 animations \"rise\""), "{refusal}");
+    assert!(refusal.ends_with("choose one by its number: \"1\", \"2\""), "{refusal}");
+    assert_eq!([lowest_with("mesh.clip='1'"), lowest_with("mesh.clip='2'")], [0.0, 1.0]);
+    file.root["animations"][0]["name"] = json!("2");
+    file.root["animations"][1].as_object_mut().unwrap().remove("name");
+    animation.write("arm.glb", &file.binary());
+    assert_eq!([lowest_with("mesh.clip='1'"), lowest_with("mesh.clip='2'")], [0.0, 1.0]);
 }
 
 #[test]
