@@ -341,6 +341,14 @@ fn clips_repeat() {
     for (time, same) in [(2.0, 0.0), (2.5, 0.5), (-1.5, 0.5), (1e6 + 0.5, 0.5), (2.0 - 1e-9, 0.0)] {
         assert_eq!(posed(&gltf, time), posed(&gltf, same), "{time}");
     }
+    // A tenth of a second, in single precision, is a little more.
+    let mut file = triangle(json!([{ "mesh": 0 }]));
+    file.clip("short", (0, "translation"), "LINEAR", &[0.0, 0.1], &[[0.0; 3], [1.0; 3]]);
+    let gltf = file.load();
+    for time in [0.1, 100.0, 3600.0, -100.0] {
+        assert!(posed(&gltf, time).positions[0].x < 1e-3, "{time}");
+    }
+    assert!(posed(&gltf, 3600.099).positions[0].x > 0.98);
     let mut file = triangle(json!([{ "mesh": 0 }]));
     file.clip("moment", (0, "translation"), "LINEAR", &[0.0], &[[1.0; 3]]);
     assert_eq!(posed(&file.load(), 5.0).positions[0], DVec3::ONE);
