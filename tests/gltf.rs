@@ -354,6 +354,26 @@ fn clips_repeat() {
     assert_eq!(posed(&file.load(), 5.0).positions[0], DVec3::ONE);
 }
 
+#[test]
+fn sparse_numbers_lie_over_zeros() {
+    let mut file = triangle(json!([{ "mesh": 0 }]));
+    let expected = file.load().mesh(None).unwrap();
+    let [ids, values] = [file.indices(&[1, 2]), file.floats("VEC3", &CORNERS[1..])];
+    let view = |accessor: usize| file.root["accessors"][accessor]["bufferView"].clone();
+    let sparse = json!({
+        "count": 2,
+        "indices": { "bufferView": view(ids), "componentType": 5121 },
+        "values": { "bufferView": view(values) },
+    });
+    file.root["accessors"][0] =
+        json!({ "componentType": 5126, "count": 3, "type": "VEC3", "sparse": sparse });
+    assert_eq!(file.load().mesh(None).unwrap(), expected);
+    for count in [1u64 << 40, u64::MAX] {
+        file.root["accessors"][0]["count"] = json!(count);
+        assert!(told(&file.try_load().map(drop).unwrap_err()).contains("holds more than"));
+    }
+}
+
 /// Two triangles that share an edge whose vertices are written twice.
 fn seam() -> File {
     let mut file = File::new(json!([{ "mesh": 0 }]));
