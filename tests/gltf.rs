@@ -829,6 +829,17 @@ fn numbers_that_are_none_are_told() {
         let told = told(&file.try_load().map(drop).unwrap_err());
         assert!(told.contains("times of keys must ascend"), "{told}");
     }
+    for (first, part) in
+        [(-1.0, "vertex 0 has a joint with the weight -1, which is below 0"), (0.0, "vertex 0 has no joints")]
+    {
+        let mut file = arm();
+        let mut weights = [[1.0, 0.0, 0.0, 0.0]; 6];
+        weights[0][0] = first;
+        let weights = file.floats("VEC4", &weights);
+        file.root["meshes"][0]["primitives"][0]["attributes"]["WEIGHTS_0"] = json!(weights);
+        let told = told(&file.try_load().map(drop).unwrap_err());
+        assert!(told.contains(part), "{told}");
+    }
     let mut file = arm();
     file.clip("far", (2, "scale"), "LINEAR", &[0.0, 1.0], &[[1.0; 3], [f32::MAX; 3]]);
     let gltf = file.load();
