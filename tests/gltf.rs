@@ -3,7 +3,7 @@
 use std::f64::consts::{FRAC_1_SQRT_2, FRAC_PI_4, FRAC_PI_8};
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex};
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
@@ -11,7 +11,7 @@ use glam::{DVec2, DVec3};
 use mesoshell::Error;
 use mesoshell::mesh::gltf::Gltf;
 use mesoshell::mesh::{Mesh, info};
-use mesoshell::progress::Silent;
+use mesoshell::progress::{Progress, Silent};
 use mesoshell::scene::{Loaded, Scene, Sequence};
 use rand::{RngExt, SeedableRng};
 use serde_json::{Value, json};
@@ -536,7 +536,7 @@ impl Animation {
 
     fn open(&self, keys: &[&str]) -> Result<Sequence, Error> {
         let keys: Vec<String> = keys.iter().map(|&key| key.to_owned()).collect();
-        Sequence::open(&self.path("scene.toml"), &keys)
+        Sequence::open(&self.path("scene.toml"), &keys, &Silent)
     }
 
     /// What is said of a scene that cannot be opened, with the advice.
@@ -595,6 +595,28 @@ fn a_scene_plays_a_clip_and_keeps_its_topology() {
     file.root["animations"][1].as_object_mut().unwrap().remove("name");
     animation.write("arm.glb", &file.binary());
     assert_eq!([lowest_with("mesh.clip='1'"), lowest_with("mesh.clip='2'")], [0.0, 1.0]);
+}
+
+#[test]
+fn reading_is_a_stage_of_the_first_frame() {
+    struct Heard(Mutex<Vec<String>>);
+    impl Progress for Heard {
+        fn stage(&self, name: &str) {
+            self.0.lock().unwrap().push(name.to_owned());
+        }
+        fn fraction(&self, _: f64) {}
+    }
+    let animation = Animation::new("file = \"arm.glb\"");
+    animation.write("arm.glb", &arm().binary());
+    let heard = Heard(Mutex::default());
+    let keys = ["mesh.time=1".to_owned()];
+    let mut sequence = Sequence::open(&animation.path("scene.toml"), &keys, &heard).unwrap();
+    assert_eq!(*heard.0.lock().unwrap(), ["loading the mesh"]);
+    let Loaded { stages, .. } = sequence.at(1, &Silent, &|_| Ok(())).unwrap();
+    assert_eq!(stages.iter().filter(|stage| stage.name == "load.mesh").count(), 1, "{stages:?}");
+    // The clip stands at its time: the mesh is kept.
+    let Loaded { stages, .. } = sequence.at(2, &Silent, &|_| Ok(())).unwrap();
+    assert!(stages.iter().all(|stage| stage.name != "load.mesh"), "{stages:?}");
 }
 
 #[test]

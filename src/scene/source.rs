@@ -14,6 +14,7 @@ use crate::mesh::generate::Generator;
 use crate::mesh::gltf::{self, Clip, Gltf, Pose};
 use crate::mesh::projection::Projection;
 use crate::mesh::{Mesh, obj};
+use crate::progress::Progress;
 use crate::volume::recipe::{self, Recipe};
 use crate::volume::{self, Interpretation, Volume};
 use crate::{Error, Result};
@@ -56,6 +57,7 @@ impl<'a> MeshSource<'a> {
         base_dir: &Path,
         moment: Moment,
         meshes: &mut MeshFiles,
+        progress: &dyn Progress,
     ) -> Result<Self> {
         match section.get_ref() {
             MeshSection { generator: Some(generator), file: None, projection: None, .. } => {
@@ -74,7 +76,7 @@ impl<'a> MeshSource<'a> {
                             "a sequence is one of OBJ files: a glTF file holds its animations itself";
                         return Err(Error::input(path, message).with_help("name a single file"));
                     }
-                    return Self::gltf(text, section, &path, moment, meshes);
+                    return Self::gltf(text, section, &path, moment, meshes, progress);
                 }
                 if let Some(clip) = clip {
                     return Err(text.error(clip.span(), "`clip` is for a glTF file, .glb or .gltf"));
@@ -101,9 +103,10 @@ impl<'a> MeshSource<'a> {
         path: &Path,
         moment: Moment,
         meshes: &mut MeshFiles,
+        progress: &dyn Progress,
     ) -> Result<Self> {
         let MeshSection { projection, clip, rate, time, .. } = section.get_ref();
-        let gltf = meshes.gltf(path, projection.as_ref())?;
+        let gltf = meshes.gltf(path, projection.as_ref(), progress)?;
         let clips = gltf.clips();
         let at = rate.map_or(1.0, |rate| rate.0) * time.map_or(moment.time, |time| time.0);
         if let Some(clip) = clip {
