@@ -21,7 +21,7 @@ fn paths() -> Vec<PathBuf> {
 
 fn open(path: &Path, overrides: &[&str]) -> Sequence {
     let overrides: Vec<_> = overrides.iter().map(|&text| text.to_owned()).collect();
-    Sequence::open(path, &overrides).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
+    Sequence::open(path, &overrides, &Silent).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
 }
 
 fn scene(sequence: &mut Sequence, frame: u32) -> Arc<Scene> {

@@ -3,7 +3,7 @@
 use std::f64::consts::{FRAC_1_SQRT_2, FRAC_PI_4, FRAC_PI_8};
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex};
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
@@ -11,7 +11,7 @@ use glam::{DVec2, DVec3};
 use mesoshell::Error;
 use mesoshell::mesh::gltf::Gltf;
 use mesoshell::mesh::{Mesh, info};
-use mesoshell::progress::Silent;
+use mesoshell::progress::{Progress, Silent};
 use mesoshell::scene::{Loaded, Scene, Sequence};
 use rand::{RngExt, SeedableRng};
 use serde_json::{Value, json};
@@ -293,6 +293,25 @@ fn values_between_keys() {
 }
 
 #[test]
+fn channels_that_move_no_node_are_ignored() {
+    let mut file = arm();
+    let expected = posed(&file.load(), 0.7);
+    let channels = file.root["animations"][0]["channels"].as_array_mut().unwrap();
+    let pointer = json!({ "KHR_animation_pointer": { "pointer": "/materials/0/alphaCutoff" } });
+    for target in [
+        json!({ "path": "translation" }),
+        json!({ "path": "pointer", "extensions": pointer }),
+        json!({ "path": "pointer", "node": 3, "extensions": pointer }),
+    ] {
+        channels.push(json!({ "sampler": 0, "target": target }));
+    }
+    assert_eq!(posed(&file.load(), 0.7), expected);
+    file.root["animations"][0]["channels"].as_array_mut().unwrap().remove(0);
+    let gltf = file.load();
+    assert_eq!((gltf.clips()[0].duration, posed(&gltf, 0.7)), (0.0, gltf.mesh(None).unwrap()));
+}
+
+#[test]
 fn rotations_go_the_shorter_way_and_stay_rotations() {
     let (sine, cosine) = FRAC_PI_8.sin_cos();
     let [sine, cosine] = [sine, cosine].map(|x| x as f32);
@@ -322,9 +341,37 @@ fn clips_repeat() {
     for (time, same) in [(2.0, 0.0), (2.5, 0.5), (-1.5, 0.5), (1e6 + 0.5, 0.5), (2.0 - 1e-9, 0.0)] {
         assert_eq!(posed(&gltf, time), posed(&gltf, same), "{time}");
     }
+    // A tenth of a second, in single precision, is a little more.
+    let mut file = triangle(json!([{ "mesh": 0 }]));
+    file.clip("short", (0, "translation"), "LINEAR", &[0.0, 0.1], &[[0.0; 3], [1.0; 3]]);
+    let gltf = file.load();
+    for time in [0.1, 100.0, 3600.0, -100.0] {
+        assert!(posed(&gltf, time).positions[0].x < 1e-3, "{time}");
+    }
+    assert!(posed(&gltf, 3600.099).positions[0].x > 0.98);
     let mut file = triangle(json!([{ "mesh": 0 }]));
     file.clip("moment", (0, "translation"), "LINEAR", &[0.0], &[[1.0; 3]]);
     assert_eq!(posed(&file.load(), 5.0).positions[0], DVec3::ONE);
+}
+
+#[test]
+fn sparse_numbers_lie_over_zeros() {
+    let mut file = triangle(json!([{ "mesh": 0 }]));
+    let expected = file.load().mesh(None).unwrap();
+    let [ids, values] = [file.indices(&[1, 2]), file.floats("VEC3", &CORNERS[1..])];
+    let view = |accessor: usize| file.root["accessors"][accessor]["bufferView"].clone();
+    let sparse = json!({
+        "count": 2,
+        "indices": { "bufferView": view(ids), "componentType": 5121 },
+        "values": { "bufferView": view(values) },
+    });
+    file.root["accessors"][0] =
+        json!({ "componentType": 5126, "count": 3, "type": "VEC3", "sparse": sparse });
+    assert_eq!(file.load().mesh(None).unwrap(), expected);
+    for count in [1u64 << 40, u64::MAX] {
+        file.root["accessors"][0]["count"] = json!(count);
+        assert!(told(&file.try_load().map(drop).unwrap_err()).contains("holds more than"));
+    }
 }
 
 /// Two triangles that share an edge whose vertices are written twice.
@@ -447,6 +494,23 @@ fn integers_strides_and_extensions_of_them_are_read() {
     assert_eq!(mesh.uvs, [[DVec2::Y, DVec2::ONE, DVec2::ZERO]]);
 }
 
+#[test]
+fn texture_coordinates_that_must_be_transformed_are_told() {
+    let mut file = triangle(json!([{ "mesh": 0 }]));
+    file.root["extensionsUsed"] = json!(["KHR_texture_transform"]);
+    file.load();
+    file.root["extensionsRequired"] = json!(["KHR_texture_basisu", "KHR_texture_transform"]);
+    let refusal = told(&file.try_load().map(drop).unwrap_err());
+    assert!(
+        refusal.contains("need the extension KHR_texture_transform") && refusal.contains("`projection`"),
+        "{refusal}"
+    );
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("file.glb");
+    std::fs::write(&path, file.binary()).unwrap();
+    Gltf::load(path, Some(&"planar-z".parse().unwrap())).unwrap();
+}
+
 /// A scene of this mesh section, and what makes it one.
 struct Animation(tempfile::TempDir);
 
@@ -472,7 +536,7 @@ impl Animation {
 
     fn open(&self, keys: &[&str]) -> Result<Sequence, Error> {
         let keys: Vec<String> = keys.iter().map(|&key| key.to_owned()).collect();
-        Sequence::open(&self.path("scene.toml"), &keys)
+        Sequence::open(&self.path("scene.toml"), &keys, &Silent)
     }
 
     /// What is said of a scene that cannot be opened, with the advice.
@@ -517,6 +581,42 @@ fn a_scene_plays_a_clip_and_keeps_its_topology() {
     let refusal = animation.refusal(&["mesh.clip=fall"]);
     assert!(refusal.contains("arm.glb has no animation \"fall\""), "{refusal}");
     assert!(refusal.ends_with("those that it has: \"bend\", \"rise\""), "{refusal}");
+
+    // By its number, too, unless another is called that; but not by the name of several.
+    let lowest_with = |key: &str| lowest(&at(&mut animation.open(&[key]).unwrap(), 3));
+    assert_eq!([lowest_with("mesh.clip='1'"), lowest_with("mesh.clip='2'")], [0.0, 1.0]);
+    file.root["animations"][0]["name"] = json!("rise");
+    animation.write("arm.glb", &file.binary());
+    let refusal = animation.refusal(&[]);
+    assert!(refusal.contains("arm.glb has 2 animations \"rise\""), "{refusal}");
+    assert!(refusal.ends_with("choose one by its number: \"1\", \"2\""), "{refusal}");
+    assert_eq!([lowest_with("mesh.clip='1'"), lowest_with("mesh.clip='2'")], [0.0, 1.0]);
+    file.root["animations"][0]["name"] = json!("2");
+    file.root["animations"][1].as_object_mut().unwrap().remove("name");
+    animation.write("arm.glb", &file.binary());
+    assert_eq!([lowest_with("mesh.clip='1'"), lowest_with("mesh.clip='2'")], [0.0, 1.0]);
+}
+
+#[test]
+fn reading_is_a_stage_of_the_first_frame() {
+    struct Heard(Mutex<Vec<String>>);
+    impl Progress for Heard {
+        fn stage(&self, name: &str) {
+            self.0.lock().unwrap().push(name.to_owned());
+        }
+        fn fraction(&self, _: f64) {}
+    }
+    let animation = Animation::new("file = \"arm.glb\"");
+    animation.write("arm.glb", &arm().binary());
+    let heard = Heard(Mutex::default());
+    let keys = ["mesh.time=1".to_owned()];
+    let mut sequence = Sequence::open(&animation.path("scene.toml"), &keys, &heard).unwrap();
+    assert_eq!(*heard.0.lock().unwrap(), ["loading the mesh"]);
+    let Loaded { stages, .. } = sequence.at(1, &Silent, &|_| Ok(())).unwrap();
+    assert_eq!(stages.iter().filter(|stage| stage.name == "load.mesh").count(), 1, "{stages:?}");
+    // The clip stands at its time: the mesh is kept.
+    let Loaded { stages, .. } = sequence.at(2, &Silent, &|_| Ok(())).unwrap();
+    assert!(stages.iter().all(|stage| stage.name != "load.mesh"), "{stages:?}");
 }
 
 #[test]
@@ -588,6 +688,10 @@ fn buffers_may_be_elsewhere_and_are_inputs() {
     assert_eq!(posed(&load().unwrap(), 0.7), expected);
     let inputs = animation.open(&[]).unwrap().inputs(1).unwrap().files;
     assert_eq!(inputs, ["arm.gltf", "fog.toml", "its data.bin"].map(|name| animation.path(name)));
+    // Behind a byte-order mark, too.
+    animation.write("arm.gltf", &[b"\xef\xbb\xbf", &file.text("its%20data.bin")[..]].concat());
+    assert_eq!(posed(&load().unwrap(), 0.7), expected);
+    assert_eq!(animation.open(&[]).unwrap().inputs(1).unwrap().files, inputs);
 
     animation.write("its data.bin", &file.bytes[1..]);
     let refusal = told(&load().map(drop).unwrap_err());
@@ -597,7 +701,7 @@ fn buffers_may_be_elsewhere_and_are_inputs() {
     assert!(refusal.contains("its data.bin: cannot be read") && refusal.contains("buffer 0 of"), "{refusal}");
     animation.write("arm.gltf", &file.text(&file.data_uri()));
     assert_eq!(posed(&load().unwrap(), 0.7), expected);
-    // Behind a binary file, too.
+    // And beside a binary file.
     let mut root = file.clone();
     root.root["buffers"] = json!([{ "byteLength": file.bytes.len(), "uri": "far.bin" }]);
     animation.write("arm.glb", &root.binary());
@@ -623,6 +727,11 @@ fn defects() -> Vec<(&'static str, Value, &'static str)> {
             "/extensionsRequired",
             json!(["KHR_draco_mesh_compression"]),
             "needs the extension KHR_draco_mesh_compression",
+        ),
+        (
+            "/extensionsRequired",
+            json!(["KHR_texture_procedurals"]),
+            "needs the extension KHR_texture_procedurals",
         ),
         ("/scene", json!(7), "there is no scene 7"),
         ("/scenes/0/nodes", json!([99]), "there is no node 99"),
@@ -741,6 +850,17 @@ fn numbers_that_are_none_are_told() {
         file.clip("when", (2, "scale"), "LINEAR", &times, &[[1.0; 3]; 2]);
         let told = told(&file.try_load().map(drop).unwrap_err());
         assert!(told.contains("times of keys must ascend"), "{told}");
+    }
+    for (first, part) in
+        [(-1.0, "vertex 0 has a joint with the weight -1, which is below 0"), (0.0, "vertex 0 has no joints")]
+    {
+        let mut file = arm();
+        let mut weights = [[1.0, 0.0, 0.0, 0.0]; 6];
+        weights[0][0] = first;
+        let weights = file.floats("VEC4", &weights);
+        file.root["meshes"][0]["primitives"][0]["attributes"]["WEIGHTS_0"] = json!(weights);
+        let told = told(&file.try_load().map(drop).unwrap_err());
+        assert!(told.contains(part), "{told}");
     }
     let mut file = arm();
     file.clip("far", (2, "scale"), "LINEAR", &[0.0, 1.0], &[[1.0; 3], [f32::MAX; 3]]);

@@ -77,7 +77,7 @@ impl Animation {
     }
 
     fn open(&self) -> Sequence {
-        Sequence::open(&self.path(), &[]).unwrap_or_else(|error| panic!("{error}"))
+        Sequence::open(&self.path(), &[], &Silent).unwrap_or_else(|error| panic!("{error}"))
     }
 }
 
@@ -235,7 +235,7 @@ fn mistakes_are_told_before_the_first_frame() {
     ];
     for (added, part) in mistakes {
         std::fs::write(animation.path(), format!("{scene}{added}")).unwrap();
-        let error = Sequence::open(&animation.path(), &[]).map(drop).unwrap_err();
+        let error = Sequence::open(&animation.path(), &[], &Silent).map(drop).unwrap_err();
         let told = error.to_string();
         assert!(told.contains(part), "{added}: {told}");
     }
@@ -267,7 +267,7 @@ fn volumes_follow_one_another() {
     }
     assert_eq!(sequence.inputs(1).unwrap().files, [2, 3, 4].map(file));
     let with = |key: &str| {
-        let mut sequence = Sequence::open(&animation.path(), &[key.to_owned()]).unwrap();
+        let mut sequence = Sequence::open(&animation.path(), &[key.to_owned()], &Silent).unwrap();
         at(&mut sequence, 6).volume.levels[0].texels[0][3]
     };
     // After three files the first comes again; a time of its own stands.
@@ -313,7 +313,7 @@ fn meshes_follow_one_another() {
     assert_eq!(sequence.inputs(1).unwrap().files[1..], [8, 9, 10].map(file));
     let with = |keys: &[&str]| {
         let keys: Vec<String> = keys.iter().map(|&key| key.to_owned()).collect();
-        at(&mut Sequence::open(&animation.path(), &keys).unwrap(), 6)
+        at(&mut Sequence::open(&animation.path(), &keys, &Silent).unwrap(), 6)
     };
     assert_eq!(height(&with(&["mesh.time=0"])), 0.0, "a time of its own stands");
     assert_eq!(height(&with(&["timeline.loop=false"])), 3.0, "it stands still at its end");
@@ -337,7 +337,7 @@ fn meshes_follow_one_another() {
 }
 
 fn animation_error(animation: &Animation) -> String {
-    Sequence::open(&animation.path(), &[]).map(drop).unwrap_err().to_string()
+    Sequence::open(&animation.path(), &[], &Silent).map(drop).unwrap_err().to_string()
 }
 
 #[test]
@@ -350,7 +350,7 @@ fn inputs_change_with_all_that_makes_a_frame() {
     assert_ne!(inputs.text, sequence.inputs(3).unwrap().text);
     let other = |overrides: &[&str]| {
         let overrides: Vec<String> = overrides.iter().map(|&one| one.to_owned()).collect();
-        Sequence::open(&animation.path(), &overrides).unwrap().inputs(2).unwrap()
+        Sequence::open(&animation.path(), &overrides, &Silent).unwrap().inputs(2).unwrap()
     };
     assert_ne!(inputs.text, other(&["march.step=0.25"]).text);
     assert_eq!(inputs.text, other(&["timeline.frames=5"]).text, "how many follow makes no difference");

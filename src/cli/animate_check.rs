@@ -66,7 +66,7 @@ fn check(arguments: &Arguments, progress: &Arc<dyn Progress>, interrupt: &Interr
     if let Some(folder) = &arguments.output {
         instrument::check_writable(folder)?;
     }
-    let mut sequence = Sequence::open(&arguments.scene, &arguments.define)?;
+    let mut sequence = Sequence::open(&arguments.scene, &arguments.define, progress.as_ref())?;
     let device = arguments.device.clone().unwrap_or_default();
     let setup = Setup { device: &device, validation: None, progress, interrupt };
     let frames = arguments.frames.of(sequence.timeline())?;

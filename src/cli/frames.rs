@@ -184,7 +184,7 @@ fn render(arguments: &Arguments, line: &Arc<FrameLine>, interrupt: &Interrupt) -
             help: Some("choose it for one frame, and give its step by -D march.step=S".into()),
         });
     }
-    let mut sequence = Sequence::open(&arguments.scene, &arguments.overrides())?;
+    let mut sequence = Sequence::open(&arguments.scene, &arguments.overrides(), &line.0)?;
     let timeline = *sequence.timeline();
     let frames = match &arguments.frames {
         Some(range) => range.of(&timeline)?,

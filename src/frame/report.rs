@@ -51,9 +51,13 @@ impl Stopwatch {
         self.last = now;
     }
 
-    /// Adds a stage whose time was measured elsewhere (a device timestamp, a part of a stage).
+    /// Adds a stage whose time was measured elsewhere (a device timestamp, a part of a stage); to one of that name, if there is one.
     pub fn add(&mut self, name: &str, time: Duration) {
-        self.stages.push(Stage { name: name.to_owned(), milliseconds: time.as_secs_f64() * 1e3 });
+        let milliseconds = time.as_secs_f64() * 1e3;
+        match self.stages.iter_mut().find(|stage| stage.name == name) {
+            Some(stage) => stage.milliseconds += milliseconds,
+            None => self.stages.push(Stage { name: name.to_owned(), milliseconds }),
+        }
     }
 
     /// The stages so far.

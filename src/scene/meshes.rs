@@ -3,12 +3,14 @@
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::time::{Duration, Instant};
 
 use super::file::MeshSection;
 use super::numbered;
 use super::timeline::Moment;
 use crate::mesh::gltf::{Gltf, Pose};
 use crate::mesh::{Mesh, Projection, obj};
+use crate::progress::Progress;
 use crate::{Error, Result};
 
 /// What a sequence shows: a mesh between those of two files.
@@ -43,6 +45,8 @@ struct Read<Of> {
 pub(super) struct MeshFiles {
     sequence: Vec<Read<Mesh>>,
     gltf: Option<Read<Gltf>>,
+    /// How long glTF files were read that no frame's report tells yet.
+    pub(super) untold: Duration,
 }
 
 impl<Of> Read<Of> {
@@ -100,10 +104,21 @@ impl MeshFiles {
 
     /// # Errors
     /// As [`Gltf::load`].
-    pub(super) fn gltf(&mut self, path: &Path, projection: Option<&Projection>) -> Result<Arc<Gltf>> {
+    pub(super) fn gltf(
+        &mut self,
+        path: &Path,
+        projection: Option<&Projection>,
+        progress: &dyn Progress,
+    ) -> Result<Arc<Gltf>> {
         let read = match self.gltf.take() {
             Some(read) if read.is(path, projection) => read,
-            _ => Read::new(path, projection, Gltf::load(path, projection)?),
+            _ => {
+                progress.stage("loading the mesh");
+                let start = Instant::now();
+                let read = Read::new(path, projection, Gltf::load(path, projection)?);
+                self.untold += start.elapsed();
+                read
+            }
         };
         Ok(self.gltf.insert(read).of.clone())
     }

@@ -4,6 +4,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::thread::JoinHandle;
+use std::time::Duration;
 
 use glam::DVec2;
 use toml::Spanned;
@@ -227,10 +228,11 @@ impl Parts {
         file: &'a SceneFile,
         base_dir: &'a Path,
         moment: Moment,
+        progress: &dyn Progress,
     ) -> Result<Checked<'a>> {
         Ok(Checked {
             camera: cameras::camera(text, file)?,
-            mesh: MeshSource::of(text, &file.mesh, base_dir, moment, &mut self.mesh_files)?,
+            mesh: MeshSource::of(text, &file.mesh, base_dir, moment, &mut self.mesh_files, progress)?,
             motion: Motion::of(text, file.mesh.get_ref().transform.as_ref(), &file.deform)?,
             wind: file.shell.wind.as_ref().map(|wind| wind.wind(text)).transpose()?,
             volume: VolumeSource::of(text, &file.volume, base_dir, moment)?,
@@ -322,6 +324,10 @@ impl Parts {
     ) -> Result<Loaded> {
         let Checked { text, file, base_dir, .. } = *checked;
         let mut stopwatch = Stopwatch::start();
+        match std::mem::take(&mut self.mesh_files.untold) {
+            Duration::ZERO => {}
+            time => stopwatch.add("load.mesh", time),
+        }
         // All that other files can have wrong is told before a long load, those that are quick to read first.
         let of_solids = (file.base.clone(), file.solid.clone());
         let solid_files = self.solid_files.get(of_solids, |(base, solids)| {

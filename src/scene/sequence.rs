@@ -8,7 +8,7 @@ use super::parts::{Parts, Rest};
 use super::text::Text;
 use super::timeline::{Moment, Timeline, Track};
 use super::{Sizes, files, load, meshes, source};
-use crate::progress::Progress;
+use crate::progress::{Progress, Silent};
 use crate::{Error, Result};
 
 /// An animated scene.
@@ -40,9 +40,9 @@ impl Sequence {
     ///
     /// # Errors
     /// As [`load`](super::load()); an error in a frame names the tracks that make it.
-    pub fn open(path: &Path, overrides: &[String]) -> Result<Self> {
+    pub fn open(path: &Path, overrides: &[String], progress: &dyn Progress) -> Result<Self> {
         let mut sequence = Self::of(load::text(path, overrides)?, path.parent().unwrap_or(Path::new("")))?;
-        sequence.check_frames()?;
+        sequence.check_frames(progress)?;
         Ok(sequence)
     }
 
@@ -57,10 +57,10 @@ impl Sequence {
 
     /// All that can be wrong in a frame, but for what its files hold; glTF files are read, since they name their animations, and
     /// sequences of files, to see that they fit together.
-    fn check_frames(&mut self) -> Result<()> {
+    fn check_frames(&mut self, progress: &dyn Progress) -> Result<()> {
         for frame in 1..=if self.tracks.is_empty() { 1 } else { self.timeline.frames } {
             let text = self.text_at(frame)?;
-            self.parts.check(&text, &load::read(&text)?, &self.base_dir, self.moment(frame))?;
+            self.parts.check(&text, &load::read(&text)?, &self.base_dir, self.moment(frame), progress)?;
         }
         let file = load::read(&self.text)?;
         meshes::check_all(file.mesh.get_ref(), &self.base_dir)?;
@@ -89,12 +89,12 @@ impl Sequence {
         if self.rest.is_none() && self.timeline.frames > 1 {
             let text = self.text_at(1)?;
             let file = load::read(&text)?;
-            let checked = self.parts.check(&text, &file, &self.base_dir, self.moment(1))?;
+            let checked = self.parts.check(&text, &file, &self.base_dir, self.moment(1), progress)?;
             self.rest = Some(self.parts.rest(&checked, progress)?);
         }
         let text = self.text_at(frame)?;
         let file = load::read(&text)?;
-        let checked = self.parts.check(&text, &file, &self.base_dir, self.moment(frame))?;
+        let checked = self.parts.check(&text, &file, &self.base_dir, self.moment(frame), progress)?;
         self.parts.build(&checked, self.rest.as_ref(), progress, admit)
     }
 
@@ -108,7 +108,7 @@ impl Sequence {
         let Some(rest) = &self.rest else { return Ok(()) };
         let text = self.text_at(frame)?;
         let file = load::read(&text)?;
-        let checked = self.parts.check(&text, &file, &self.base_dir, self.moment(frame))?;
+        let checked = self.parts.check(&text, &file, &self.base_dir, self.moment(frame), &Silent)?;
         self.parts.prefetch(&checked, rest);
         Ok(())
     }

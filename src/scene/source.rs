@@ -11,9 +11,10 @@ use super::numbered;
 use super::text::Text;
 use super::timeline::Moment;
 use crate::mesh::generate::Generator;
-use crate::mesh::gltf::{self, Gltf, Pose};
+use crate::mesh::gltf::{self, Clip, Gltf, Pose};
 use crate::mesh::projection::Projection;
 use crate::mesh::{Mesh, obj};
+use crate::progress::Progress;
 use crate::volume::recipe::{self, Recipe};
 use crate::volume::{self, Interpretation, Volume};
 use crate::{Error, Result};
@@ -56,6 +57,7 @@ impl<'a> MeshSource<'a> {
         base_dir: &Path,
         moment: Moment,
         meshes: &mut MeshFiles,
+        progress: &dyn Progress,
     ) -> Result<Self> {
         match section.get_ref() {
             MeshSection { generator: Some(generator), file: None, projection: None, .. } => {
@@ -74,7 +76,7 @@ impl<'a> MeshSource<'a> {
                             "a sequence is one of OBJ files: a glTF file holds its animations itself";
                         return Err(Error::input(path, message).with_help("name a single file"));
                     }
-                    return Self::gltf(text, section, &path, moment, meshes);
+                    return Self::gltf(text, section, &path, moment, meshes, progress);
                 }
                 if let Some(clip) = clip {
                     return Err(text.error(clip.span(), "`clip` is for a glTF file, .glb or .gltf"));
@@ -101,17 +103,15 @@ impl<'a> MeshSource<'a> {
         path: &Path,
         moment: Moment,
         meshes: &mut MeshFiles,
+        progress: &dyn Progress,
     ) -> Result<Self> {
         let MeshSection { projection, clip, rate, time, .. } = section.get_ref();
-        let gltf = meshes.gltf(path, projection.as_ref())?;
+        let gltf = meshes.gltf(path, projection.as_ref(), progress)?;
         let clips = gltf.clips();
         let at = rate.map_or(1.0, |rate| rate.0) * time.map_or(moment.time, |time| time.0);
         if let Some(clip) = clip {
-            let index = clips.iter().position(|one| one.name == *clip.get_ref()).ok_or_else(|| {
-                let names: Vec<String> = clips.iter().map(|clip| format!("\"{}\"", clip.name)).collect();
-                let there_are = if names.is_empty() { "none".to_owned() } else { names.join(", ") };
-                let message = format!("{} has no animation \"{}\"", path.display(), clip.get_ref());
-                text.error(clip.span(), message).with_help(format!("those that it has: {there_are}"))
+            let index = clip_index(clips, clip.get_ref()).map_err(|(message, help)| {
+                text.error(clip.span(), format!("{} {message}", path.display())).with_help(help)
             })?;
             let pose = gltf.pose(index, at);
             return Ok(Self::Gltf(gltf, Some(pose)));
@@ -143,6 +143,32 @@ impl<'a> MeshSource<'a> {
             Self::Gltf(gltf, pose) => gltf.mesh(*pose),
         }
     }
+}
+
+/// The clip of that name; where none has it, the one of that number, from 1.
+///
+/// # Errors
+/// What is wrong with the file, and what helps, where there is none, or more than one.
+fn clip_index(clips: &[Clip], name: &str) -> std::result::Result<usize, (String, String)> {
+    let named: Vec<usize> = (0..clips.len()).filter(|&index| clips[index].name == name).collect();
+    let numbered = || name.parse::<usize>().ok()?.checked_sub(1).filter(|index| *index < clips.len());
+    let one_or_none = match named[..] {
+        [] => numbered(),
+        [index] => Some(index),
+        // One without a name, beside another that is called as its number.
+        _ => numbered().filter(|index| named.contains(index)),
+    };
+    one_or_none.ok_or_else(|| {
+        if named.is_empty() {
+            let names: Vec<String> = clips.iter().map(|clip| format!("\"{}\"", clip.name)).collect();
+            let there_are = if names.is_empty() { "none".to_owned() } else { names.join(", ") };
+            return (format!("has no animation \"{name}\""), format!("those that it has: {there_are}"));
+        }
+        let count = named.len();
+        let numbers: Vec<String> = named.iter().map(|index| format!("\"{}\"", index + 1)).collect();
+        let help = format!("choose one by its number: {}", numbers.join(", "));
+        (format!("has {count} animations \"{name}\""), help)
+    })
 }
 
 /// Where the volume comes from.

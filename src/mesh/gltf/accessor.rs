@@ -18,7 +18,8 @@ struct Format {
 }
 
 impl Document {
-    /// The elements of an accessor, of `N` numbers each. Where their `count` is known they need not be stored: they are zero.
+    /// The elements of an accessor, of `N` numbers each. One without a buffer view holds zeros, under what is sparse; that is refused
+    /// where neither anything is sparse nor their `count` is told.
     ///
     /// # Errors
     /// [`Error::Input`](crate::Error::Input) where the accessor is of another shape, or not of `count`, its bytes are not there, or one of its
@@ -48,11 +49,13 @@ impl Document {
         let offset = accessor.byte_offset.unwrap_or_default().0;
         let mut numbers = match (accessor.buffer_view, count) {
             (Some(view), _) => self.stored(view, offset, own, format)?,
-            (None, Some(count)) => {
-                self.spend((count * N) as u64)?;
-                vec![[0.0; N]; count]
+            (None, None) if accessor.sparse.is_none() => {
+                return Err(self.error("it has no buffer view, in which its numbers would be"));
             }
-            (None, None) => return Err(self.error("it has no buffer view, in which its numbers would be")),
+            (None, _) => {
+                self.spend(own.saturating_mul(N as u64))?;
+                vec![[0.0; N]; own as usize]
+            }
         };
         if let Some(sparse) = &accessor.sparse {
             self.lay_over(sparse, format, &mut numbers)?;

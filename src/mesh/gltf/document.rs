@@ -9,8 +9,9 @@ use std::path::{Path, PathBuf};
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD_NO_PAD;
-use gltf::json::{self, Index, Root, root::Get};
+use gltf::json::{Index, Root, root::Get};
 use serde::Deserialize;
+use serde_json::Value;
 
 use crate::{Error, Result, input};
 
@@ -26,9 +27,18 @@ const MAGIC: &[u8] = b"glTF";
 /// Of the header, with the head of the first chunk.
 const GLB_HEAD: usize = 20;
 
-/// What a reader need not know to find the triangles, or what is known.
-const EXTENSIONS: [&str; 5] =
-    ["KHR_materials_", "KHR_texture_", "EXT_texture_", "KHR_lights_punctual", "KHR_mesh_quantization"];
+/// What a reader need not know to find the triangles, or what is known: beginnings of names.
+const EXTENSIONS: [&str; 6] = [
+    "KHR_materials_",
+    "KHR_texture_basisu",
+    TEXTURE_TRANSFORM,
+    "EXT_texture_",
+    "KHR_lights_punctual",
+    "KHR_mesh_quantization",
+];
+
+/// Moves texture coordinates, but by the material: where it is needed, those of the file alone are of no use.
+const TEXTURE_TRANSFORM: &str = "KHR_texture_transform";
 
 /// A file that was read.
 pub(super) struct Document {
@@ -47,8 +57,7 @@ impl Document {
         let bytes = input::bytes(path, LONGEST_FILE)
             .map_err(|error| Error::input(path, format!("cannot be read: {error}")))?;
         let (json, chunk) = if bytes.starts_with(MAGIC) { binary(path, &bytes)? } else { (&bytes[..], None) };
-        let json = json.strip_prefix(b"\xef\xbb\xbf").unwrap_or(json);
-        let root: Root = json::deserialize::from_slice(json)
+        let root = root_of(without_mark(json))
             .map_err(|error| damaged(path, format!("is not a readable glTF file: {error}")))?;
         check_kind(path, &root)?;
         let mut left = LONGEST_FILE;
@@ -81,6 +90,20 @@ impl Document {
     /// What is wrong with the file.
     pub fn error(&self, message: impl Into<String>) -> Error {
         damaged(&self.path, message)
+    }
+
+    /// # Errors
+    /// [`Error::Input`] where texture coordinates, as they are stored, are not those that are meant.
+    pub fn check_uvs(&self) -> Result<()> {
+        if !self.root.extensions_required.iter().any(|name| name == TEXTURE_TRANSFORM) {
+            return Ok(());
+        }
+        let message =
+            format!("its texture coordinates need the extension {TEXTURE_TRANSFORM}, which is not supported");
+        Err(Error::input(&self.path, message).with_help(
+            "export it with texture coordinates in floating point and without that extension, or set `projection` under `[mesh]` \
+             in the scene",
+        ))
     }
 
     /// What an index stands for.
@@ -119,7 +142,8 @@ pub fn named_files(path: &Path) -> Vec<PathBuf> {
     struct Buffer {
         uri: Option<String>,
     }
-    let named: Option<Named> = json_of(path).and_then(|json| serde_json::from_slice(&json).ok());
+    let named: Option<Named> =
+        json_of(path).and_then(|json| serde_json::from_slice(without_mark(&json)).ok());
     let uris = named.into_iter().flat_map(|named| named.buffers).filter_map(|buffer| buffer.uri);
     uris.filter(|uri| !is_data(uri)).map(|uri| beside(path, &uri)).collect()
 }
@@ -138,6 +162,28 @@ fn json_of(path: &Path) -> Option<Vec<u8>> {
     };
     file.take(rest.min(LONGEST_FILE)).read_to_end(&mut json).ok()?;
     Some(json)
+}
+
+/// Without the byte-order mark that some editors put before a text.
+fn without_mark(json: &[u8]) -> &[u8] {
+    json.strip_prefix(b"\xef\xbb\xbf").unwrap_or(json)
+}
+
+/// Without channels that move no node, which are to be ignored, or (`KHR_animation_pointer`) something that is not read.
+fn root_of(json: &[u8]) -> serde_json::Result<Root> {
+    let mut root: Value = serde_json::from_slice(json)?;
+    let animations = root.get_mut("animations").and_then(Value::as_array_mut);
+    for animation in animations.into_iter().flatten() {
+        if let Some(channels) = animation.get_mut("channels").and_then(Value::as_array_mut) {
+            channels.retain(|channel| {
+                let target = |key| channel.get("target").and_then(|target| target.get(key));
+                channel.get("target").is_none()
+                    || target("node").is_some_and(|node| !node.is_null())
+                        && target("path").is_none_or(|path| path != "pointer")
+            });
+        }
+    }
+    serde_json::from_value(root)
 }
 
 fn damaged(path: &Path, message: impl Into<String>) -> Error {

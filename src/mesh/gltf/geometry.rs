@@ -183,7 +183,10 @@ impl Builder<'_> {
         let first = self.sources.len() as u32;
         let uvs = match attribute(Semantic::TexCoords(0)) {
             _ if !self.base.needs_uvs => None,
-            Some(uvs) => Some(document.numbers::<2>(uvs, Some(count))?),
+            Some(uvs) => {
+                document.check_uvs()?;
+                Some(document.numbers::<2>(uvs, Some(count))?)
+            }
             None => {
                 let message = "it has no texture coordinates, and a shell texture needs them";
                 return Err(document.error(message).with_help(projection::ADVICE));
@@ -280,8 +283,12 @@ impl Builder<'_> {
                 bone.1 += if is_same { again.1 } else { 0.0 };
                 is_same
             });
+            if let Some((_, share)) = bones.iter().find(|(_, share)| *share < 0.0) {
+                let message = format!("vertex {id} has a joint with the weight {share}, which is below 0");
+                return Err(document.error(message));
+            }
             let sum: f64 = bones.iter().map(|(_, share)| share).sum();
-            if sum <= 0.0 || bones.iter().any(|(_, share)| *share < 0.0) {
+            if sum == 0.0 {
                 return Err(document
                     .error(format!("vertex {id} has no joints with weights above 0, but its mesh has a skin"))
                     .with_help("bind every vertex to a joint, and export the file again"));

@@ -42,8 +42,10 @@ use crate::{Error, Result};
 /// Vertices that one task of the thread pool takes at least: some 20 us of work.
 const TASK: usize = 256;
 
-/// How near to its end a clip begins again, in seconds: a time that is a whole number of its durations, but for rounding.
-const END_ROUNDING: f64 = 1e-6;
+/// How near to its end a clip begins again, in seconds or, after a second, relative to the time: one that is a whole number of its
+/// durations, but for their being written in single precision, which is off by up to 6e-8 of it. More than that would cut off
+/// what is shown: after an hour it is less than a millisecond.
+const END_ROUNDING: f64 = 2e-7;
 
 /// Whether a name ends as those of glTF files do.
 pub fn has_name_of_one(path: &Path) -> bool {
@@ -186,9 +188,10 @@ impl Gltf {
     /// Where there is no such clip.
     pub fn pose(&self, clip: usize, time: f64) -> Pose {
         let duration = self.clips[clip].duration;
+        let rounding = END_ROUNDING * time.abs().max(1.0);
         // Not a number where the clip has a single moment.
         let time = time.rem_euclid(duration);
-        let is_within = time < duration - END_ROUNDING;
+        let is_within = time < duration - rounding;
         Pose { clip, time: if is_within { time } else { 0.0 } }
     }
 
