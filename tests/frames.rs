@@ -107,8 +107,11 @@ fn what_is_up_to_date_is_left_alone_and_what_is_not_is_drawn() {
         std::fs::remove_file(folder.path(&output.replace("####", "0003"))).unwrap();
         assert_eq!(counts(&[]), [1, 3]);
         let torn = folder.path(&output.replace("####", "0002"));
-        std::fs::write(&torn, "no picture").unwrap();
-        assert_eq!(counts(&[]), [1, 3]);
+        let whole = std::fs::read(&torn).unwrap();
+        for left in [&b"no picture"[..], &whole[..whole.len() - 1], &whole[..2 * whole.len() / 3]] {
+            std::fs::write(&torn, left).unwrap();
+            assert_eq!(counts(&[]), [1, 3]);
+        }
         // Another value, another size, another method, another file.
         assert_eq!(counts(&["-D", "march.step=0.25"]), [4, 0]);
         assert_eq!(counts(&["-D", "march.step=0.25", "--size", "16x16"]), [4, 0]);
@@ -182,7 +185,8 @@ fn a_run_that_is_ended_says_so_and_leaves_nothing_half_done() {
 #[test]
 fn requests_that_make_no_sense_end_before_the_first_frame() {
     let folder = Folder::new();
-    let requests: [(&str, &[&str], &str); 7] = [
+    let requests: [(&str, &[&str], &str); 8] = [
+        ("##.png", &[], "a place for the number of a frame, but one picture is asked for"),
         ("##.png", &["--frames", "1-41"], "there is no frame 41"),
         ("##.png", &["--frames", "9-3"], "write 3-9"),
         ("##.png", &["--frames", "a"], "`a` is no number of a frame"),

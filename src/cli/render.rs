@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser};
-use mesoshell::film::FrameRange;
+use mesoshell::film::{FrameRange, Names};
 use mesoshell::frame::{Report, Stage, Stopwatch, file};
 use mesoshell::gpu::{DeviceChoice, Messages};
 use mesoshell::method::{self, METHODS, Setup};
@@ -104,6 +104,17 @@ struct Rendered {
 pub fn run(arguments: Arguments, talk: Talk) -> Result<ExitCode> {
     if frames::are_wanted(&arguments) {
         return frames::run(&arguments, talk);
+    }
+    if let Some(output) =
+        arguments.output.as_deref().filter(|name| Names::new(name).is_ok_and(|names| names.differ()))
+    {
+        return Err(Error::Usage {
+            message: format!(
+                "{} has a place for the number of a frame, but one picture is asked for",
+                output.display()
+            ),
+            help: Some("add --frames all, or the numbers of those that are wanted".into()),
+        });
     }
     let interrupt = Interrupt::default();
     listen(&interrupt);

@@ -58,5 +58,5 @@ fn of_file(path: &Path) -> Result<Fingerprint> {
 
 /// Whether the picture at `path` bears this mark: is there, whole, and up to date.
 pub fn is_on(path: &Path, mark: &str) -> bool {
-    file::mark(path).is_some_and(|found| found == mark)
+    file::mark(path).is_some_and(|found| found == mark) && file::is_whole(path)
 }

@@ -15,7 +15,7 @@ use image::codecs::openexr::OpenExrDecoder;
 use image::codecs::png::{PngDecoder, PngEncoder};
 use image::{DynamicImage, ExtendedColorType, ImageDecoder, ImageEncoder, ImageError, Limits};
 
-pub use mark::mark;
+pub use mark::{is_whole, mark};
 pub use picture::{is_picture, read_picture};
 
 use super::srgb::{linear_from_srgb, srgb_from_linear};

@@ -230,6 +230,7 @@ impl Parts {
         moment: Moment,
         progress: &dyn Progress,
     ) -> Result<Checked<'a>> {
+        self.thickness_map(file, base_dir)?;
         Ok(Checked {
             camera: cameras::camera(text, file)?,
             mesh: MeshSource::of(text, &file.mesh, base_dir, moment, &mut self.mesh_files, progress)?,
@@ -241,6 +242,12 @@ impl Parts {
             file,
             base_dir,
         })
+    }
+
+    fn thickness_map(&mut self, file: &SceneFile, base_dir: &Path) -> Result<Option<Arc<Grey>>> {
+        let read = |path: &PathBuf| thickness::read(path).map(Arc::new);
+        let map = file.shell.thickness_map.as_ref();
+        map.map(|file| self.thickness_map.get(base_dir.join(file), read)).transpose()
     }
 
     /// The shell of a scene, and what it is made of; `stopwatch` is told what was not kept.
@@ -266,10 +273,8 @@ impl Parts {
             stopwatch.lap("deform");
             Ok(Arc::new(moved))
         })?;
-        let thickness_map = checked.file.shell.thickness_map.as_ref().map(|file| {
-            self.thickness_map.get(checked.base_dir.join(file), |path| thickness::read(path).map(Arc::new))
-        });
-        let scale = thickness_map.transpose()?.map_or_else(Vec::new, |map| thickness::factors(&map, &mesh));
+        let thickness_map = self.thickness_map(checked.file, checked.base_dir)?;
+        let scale = thickness_map.map_or_else(Vec::new, |map| thickness::factors(&map, &mesh));
         let before = self.shell.0.as_ref().map(|(_, shell)| shell.clone());
         let spare = &mut self.spare;
         let shell = self.shell.get((Same(mesh.clone()), checked.shell_options(scale)), |(_, options)| {

@@ -1,6 +1,6 @@
 //! A line of text in a picture's file, beside the picture.
 
-use std::io::{Cursor, Read};
+use std::io::{Cursor, Read, Seek, SeekFrom};
 use std::path::Path;
 
 use exr::prelude::{AttributeValue, Image as ExrImage, SpecificChannels, Text, Vec2, WritableImage};
@@ -17,6 +17,9 @@ const LONGEST_HEADER: u64 = 1 << 16;
 
 /// What a PNG begins with: its signature, then the chunk `IHDR` of 25 bytes.
 const PNG_HEAD: usize = 8 + 25;
+
+/// What a PNG ends with: the chunk `IEND`, which is empty.
+const PNG_END: &[u8; 12] = b"\0\0\0\0IEND\xae\x42\x60\x82";
 
 /// The mark of a picture that [`write_marked`](super::write_marked) has written; `None` where there is none, or no such file.
 pub fn mark(path: &Path) -> Option<String> {
@@ -35,6 +38,23 @@ pub fn mark(path: &Path) -> Option<String> {
         Format::Exr => exr_header::attribute(&head, KEYWORD.as_bytes())?,
     };
     String::from_utf8(text.to_vec()).ok()
+}
+
+/// Whether a picture that has a [`mark`] is there to its end: a copy that broke off, or a disk that was full, leaves less.
+pub fn is_whole(path: &Path) -> bool {
+    match Format::of(path) {
+        Ok(Format::Png) => ends_as_png(path).unwrap_or(false),
+        Ok(Format::Exr) => super::read(path).is_ok(),
+        Err(_) => false,
+    }
+}
+
+fn ends_as_png(path: &Path) -> std::io::Result<bool> {
+    let (mut file, _) = input::open(path)?;
+    let mut end = [0; PNG_END.len()];
+    file.seek(SeekFrom::End(-(PNG_END.len() as i64)))?;
+    file.read_exact(&mut end)?;
+    Ok(end == *PNG_END)
 }
 
 /// The PNG with a chunk of text after its header ("PNG Specification", third edition, 11.3.3.2).
@@ -87,9 +107,11 @@ mod tests {
             assert_eq!(read(&path).unwrap(), plain, "{name}");
             // Whatever is left of a file, nothing goes wrong.
             let bytes = std::fs::read(&path).unwrap();
-            for length in 0..bytes.len().min(400) {
+            assert!(is_whole(&path));
+            for length in (0..bytes.len().min(400)).chain([bytes.len() - 1]) {
                 std::fs::write(&path, &bytes[..length]).unwrap();
                 mark(&path);
+                assert!(!is_whole(&path), "{length} of {} bytes", bytes.len());
             }
         }
     }

@@ -80,7 +80,7 @@ impl Shell {
                 health.inverted,
                 health.tetrahedra,
                 match self.scene.shell.limit {
-                    Some(_) => "no thickness helps there: smooth its directions by shell.smoothing, or mend the mesh",
+                    Some(_) => "no thickness helps there: normals lie below their triangles, which only another mesh mends",
                     None => "make it thinner, smooth its directions, or let it give way by shell.limit = \"safe\"",
                 }
             ));
