@@ -151,7 +151,10 @@ fn sorter<'a>(kept: &'a mut Option<(Arc<Topology>, Sorter)>, shell: &shell::Shel
 impl Shell {
     /// Whether rays walk; else tetrahedra are sorted.
     fn walks(&self) -> bool {
-        self.scene.traversal == Traversal::Walk && matches!(self.scene.march, March::Default { .. })
+        let march = self.scene.march;
+        self.scene.traversal == Traversal::Walk
+            && matches!(march, March::Default { .. })
+            && constants::wanted_samples(march, self.texels) <= walk::MOST_SAMPLES
     }
 
     /// Where a light casts any.
@@ -295,6 +298,9 @@ impl Method for Shell {
             canvas.target.read(1).into_iter().map(mean).collect()
         });
         watch.lap("read");
+        if shadows.is_some() {
+            check_shadows(&rgba)?;
+        }
         let left = left::fill(
             matches!(sight, Sight::Sorted(_)).then_some(&seen),
             &self.scene,
@@ -305,9 +311,6 @@ impl Method for Shell {
             &self.interrupt,
         )?;
         watch.lap("left");
-        if shadows.is_some() {
-            check_shadows(&rgba)?;
-        }
         let mut report = self.report(&sight, &seen, &rgba);
         report.skipped.extend(kept);
         if keeps_shadows && shadows.is_some() {
@@ -329,9 +332,11 @@ impl Method for Shell {
     }
 }
 
-/// Pixels that are lit through more of the shell than a light's picture resolves are not finite: see `glsl/include/shadows.glsl`.
+/// Pixels that are lit through more of the shell than a light's picture resolves have colours that are not finite: see
+/// `glsl/include/shadows.glsl`. Of those that are left to the host alpha is not, either.
 fn check_shadows(rgba: &[[f32; 4]]) -> Result<()> {
-    let unresolved = rgba.iter().filter(|pixel| !pixel.iter().all(|x| x.is_finite())).count();
+    let is_unresolved = |pixel: &&[f32; 4]| pixel[3].is_finite() && !pixel.iter().all(|x| x.is_finite());
+    let unresolved = rgba.iter().filter(is_unresolved).count();
     if unresolved == 0 {
         return Ok(());
     }

@@ -11,6 +11,10 @@ use crate::shell::{Shell, Topology};
 /// The side of the squares in which the picture is drawn, in pixels: `SIDE` of `glsl/walk.vert.glsl`.
 const SIDE: u32 = 64;
 
+/// In one tetrahedron, at most: a ray that passes a dozen such has nearly as many as `MOST_PASSES` of `glsl/include/walk.glsl`, and
+/// would be left to the host. Where there may be more, tetrahedra are sorted.
+pub const MOST_SAMPLES: f64 = 500.0;
+
 /// A shell's faces.
 pub struct Ways {
     topology: Arc<Topology>,
