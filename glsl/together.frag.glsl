@@ -23,18 +23,40 @@ uint places[MOST_WALKERS]; // where each has entered its tetrahedron
 uint exits[MOST_WALKERS];  // where it leaves it
 float ends[MOST_WALKERS];  // how deep that is
 uint walkers = 0;
+// Whether the host must see to this pixel.
+bool is_left = false;
 
 void begin_at(uint place, vec3 ray) {
+    if (walkers == MOST_WALKERS) {
+        is_left = true;
+        return;
+    }
     places[walkers] = place;
     exits[walkers] = exit_of(place, ray, ends[walkers]);
     if (exits[walkers] != NOWHERE) walkers++;
+    else is_left = true;
+}
+
+// Whether a ray leaves the shell by `exit`, or as deep by another face.
+bool leaves_by(uint exit, float depth, int first, int last, vec3 ray) {
+    for (int i = first; i < last; i++) {
+        uint crossing = texelFetch(crossings, i).x;
+        if ((crossing & LEAVES) == 0) continue;
+        uint leave = crossing & ~LEAVES;
+        vec4 face = plane_at(leave);
+        float towards_inside = dot(face.xyz, ray);
+        bool is_near = abs(face.w / towards_inside - depth) <= STRAY * depth;
+        if (-towards_inside > FLAT * length(ray) && (exit == leave || is_near)) return true;
+    }
+    return false;
 }
 
 void main() {
-    int next;
+    int first;
     int last;
-    entries_of_pixel(true, next, last);
-    if (next == last) discard;
+    bool is_begun;
+    crossings_of_pixel(true, first, last, is_begun);
+    if (first == last) discard;
     vec3 ray = pixel_ray();
     float per_depth = length(ray) * view.per_opacity_distance;
 #ifdef SOLIDS
@@ -44,13 +66,27 @@ void main() {
 #endif
     Light light = Light(Gathered(vec4(0.0), vec4(0.0)), 0.0);
     uint passes = 0;
-    bool crowded = false;
     float z = view.near;
-    while (passes < MOST_PASSES) {
+    if (is_begun) {
+        // Any of the parts that it leaves may be one that it begins in.
+        for (int i = first; i < last; i++) {
+            uint leave = texelFetch(crossings, i).x;
+            if ((leave & LEAVES) == 0) continue;
+            uint place = back_to_start(leave & ~LEAVES, ray, passes);
+            if (place != NOWHERE) begin_at(place, ray);
+        }
+    }
+    int next = first;
+    while (!is_left && passes < MOST_PASSES) {
         passes++;
-        uint entry = next < last ? texelFetch(entries, next).x : NOWHERE;
-        bool leaves = entry != NOWHERE && (entry & LEAVES) != 0;
-        float horizon = entry == NOWHERE ? FAR : leaves ? z : depth_at(entry, ray);
+        uint entry = NOWHERE;
+        while (entry == NOWHERE && next < last) {
+            uint crossing = texelFetch(crossings, next).x;
+            if ((crossing & LEAVES) != 0) next++;
+            else entry = crossing;
+        }
+        float horizon = FAR;
+        if (entry != NOWHERE && !enters(entry, ray, horizon)) is_left = true;
         if (walkers == 0) {
             if (entry == NOWHERE) break;
             z = max(z, horizon);
@@ -91,11 +127,16 @@ void main() {
             if (ends[i] <= z) {
                 uint place = texelFetch(beyond, int(exits[i])).x;
                 passes++;
+                if (place == NOWHERE) {
+                    passes += uint(last - first);
+                    is_left = is_left || !leaves_by(exits[i], ends[i], first, last, ray);
+                }
                 if (place != NOWHERE) {
                     places[i] = place;
                     exits[i] = exit_of(place, ray, ends[i]);
                 }
                 if (place == NOWHERE || exits[i] == NOWHERE) {
+                    is_left = is_left || place != NOWHERE;
                     walkers--;
                     places[i] = places[walkers];
                     exits[i] = exits[walkers];
@@ -107,14 +148,10 @@ void main() {
         }
         if (entry != NOWHERE && horizon <= z) {
             next++;
-            crowded = crowded || walkers == MOST_WALKERS;
-            if (crowded) break;
-            uint place = entry;
-            if (INSIDE && leaves) place = back_to_start(entry & ~LEAVES, ray, passes);
-            if (place != NOWHERE) begin_at(place, ray);
+            begin_at(entry, ray);
         }
     }
-    bool is_left = crowded || passes >= MOST_PASSES;
+    is_left = is_left || passes >= MOST_PASSES;
     out_rgba = is_left ? vec4(uintBitsToFloat(0x7f800000u)) : light.gathered.rgba;
 #ifdef DEPTH
     out_depth = vec4(light.depth * length(ray), 0.0, 0.0, light.gathered.rgba.a);

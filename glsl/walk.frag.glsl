@@ -20,7 +20,8 @@ layout(location = 1) out vec4 out_depth; // (distance * alpha, 0, 0, alpha)
 void main() {
     int next;
     int last;
-    entries_of_pixel(false, next, last);
+    bool is_begun;
+    crossings_of_pixel(false, next, last, is_begun);
     if (next == last) discard;
     vec3 ray = pixel_ray();
     float per_depth = length(ray) * view.per_opacity_distance;
@@ -33,23 +34,22 @@ void main() {
     uint place = NOWHERE;
     float from = view.near;
     uint passes = 0;
-    if (INSIDE) {
-        uint entry = texelFetch(entries, next).x;
-        if ((entry & LEAVES) != 0) {
-            next++;
-            place = back_to_start(entry & ~LEAVES, ray, passes);
-        }
-    }
-    while (passes < MOST_PASSES) {
+    bool strays = false;
+    if (is_begun) place = back_to_start(texelFetch(crossings, next).x & ~LEAVES, ray, passes);
+    while (!strays && passes < MOST_PASSES) {
+        passes++;
         if (place == NOWHERE) {
-            if (next == last || transmittance(light.gathered) <= SATURATED) break;
-            place = texelFetch(entries, next++).x;
-            from = max(from, depth_at(place, ray));
+            if (next == last) break;
+            uint crossing = texelFetch(crossings, next++).x;
+            if ((crossing & LEAVES) != 0) continue;
+            place = crossing;
+            float depth;
+            strays = strays || !enters(place, ray, depth);
+            from = max(from, depth);
         }
         float depth;
         uint exit = exit_of(place, ray, depth);
         vec2 segment = vec2(from, min(depth, farthest));
-        passes++;
         if (exit != NOWHERE && segment.y > segment.x) {
             vec4 rows[3];
             texture_of(place >> 2, rows);
@@ -64,11 +64,18 @@ void main() {
             march_midpoints(path, segment, per_depth, samples, light);
             from = segment.y;
         }
-        place = exit == NOWHERE || depth >= farthest || transmittance(light.gathered) <= SATURATED
-            ? NOWHERE : texelFetch(beyond, int(exit)).x;
-        if (depth >= farthest) break;
+        if (from >= farthest || transmittance(light.gathered) <= SATURATED) break;
+        place = exit == NOWHERE ? NOWHERE : texelFetch(beyond, int(exit)).x;
+        if (place == NOWHERE && next < last) {
+            uint leave = texelFetch(crossings, next).x;
+            if ((leave & LEAVES) != 0) {
+                next++;
+                strays = strays || !leaves(from, exit, leave & ~LEAVES, ray);
+            }
+        }
     }
-    out_rgba = passes < MOST_PASSES ? light.gathered.rgba : vec4(uintBitsToFloat(0x7f800000u));
+    bool is_left = strays || passes >= MOST_PASSES;
+    out_rgba = is_left ? vec4(uintBitsToFloat(0x7f800000u)) : light.gathered.rgba;
 #ifdef DEPTH
     out_depth = vec4(light.depth * length(ray), 0.0, 0.0, light.gathered.rgba.a);
 #endif

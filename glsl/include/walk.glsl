@@ -5,15 +5,16 @@ layout(constant_id = 5) const bool INSIDE = false; // whether rays begin in the 
 
 layout(set = 0, binding = 18) uniform samplerBuffer cells;    // of src/method/shell/seen.rs, nine texels each
 layout(set = 0, binding = 19) uniform usamplerBuffer beyond;  // four a tetrahedron: the place beyond each face, or NOWHERE
-layout(set = 0, binding = 20) uniform usamplerBuffer firsts;  // of each pixel, row by row, in `entries`; and after the last
-layout(set = 0, binding = 21) uniform usamplerBuffer entries; // places where rays enter the shell, front to back
+layout(set = 0, binding = 20) uniform usamplerBuffer firsts;  // of each pixel, row by row, in `crossings`; and after the last
+layout(set = 0, binding = 21) uniform usamplerBuffer crossings; // places where rays enter the shell and leave it, front to back
 
 // A place is four times a tetrahedron and the number of its face.
 const uint NOWHERE = 0xffffffffu;
-// In `entries`: the ray may have begun in the shell; here it leaves it.
+// In `crossings`: here the ray leaves the shell; else it enters it.
 const uint LEAVES = 0x80000000u;
-// In `firsts`: the ray is in two parts of the shell at once.
+// In `firsts`: the ray is in two parts of the shell at once; it begins in the shell.
 const uint INTRICATE = 0x80000000u;
+const uint BEGUN = 0x40000000u;
 
 // Where less is let through the rest is not looked at.
 const float SATURATED = 9.5367431640625e-7; // 2^-20
@@ -23,6 +24,9 @@ const float SATURATED = 9.5367431640625e-7; // 2^-20
 const uint MOST_PASSES = 8000;
 
 const float FAR = 3.0e38;
+
+// By how much of itself a depth may be off, for rounding: 2^-18.
+const float STRAY = 3.814697265625e-6;
 
 vec4 plane_at(uint place) {
     return texelFetch(cells, int((place >> 2) * 9 + 2 + (place & 3)));
@@ -36,19 +40,43 @@ void planes_of(uint cell, out vec4 planes[4]) {
     for (int i = 0; i < 4; i++) planes[i] = texelFetch(cells, int(cell * 9) + 2 + i);
 }
 
-// The entries of this pixel, from `next` to before `last`: none, unless its ray is as intricate as asked. Where several pixels run at
-// once, those that are discarded may run on with the others: without entries they soon stop.
-void entries_of_pixel(bool intricate, out int next, out int last) {
+// The crossings of this pixel, from `next` to before `last`: none, unless its ray is as intricate as asked. Where several pixels run at
+// once, those that are discarded may run on with the others: without crossings they soon stop.
+void crossings_of_pixel(bool intricate, out int next, out int last, out bool is_begun) {
     int pixel = int(gl_FragCoord.y) * int(2.0 * view.centre.x) + int(gl_FragCoord.x);
     uint begin = texelFetch(firsts, pixel).x;
-    next = int(begin & ~INTRICATE);
-    last = int(texelFetch(firsts, pixel + 1).x & ~INTRICATE);
+    next = int(begin & ~(INTRICATE | BEGUN));
+    last = int(texelFetch(firsts, pixel + 1).x & ~(INTRICATE | BEGUN));
+    is_begun = INSIDE && (begin & BEGUN) != 0;
     if (((begin & INTRICATE) != 0) != intricate) last = next;
 }
 
-float depth_at(uint place, vec3 ray) {
-    vec4 plane = plane_at(place);
-    return plane.w / dot(plane.xyz, ray);
+// Parts of the shell may touch at faces that know nothing of one another, and rays may lie in the planes of those. Then f32 takes
+// them to cross such a face anywhere, out into nothing or in from it. Such rays are left to the host.
+
+// Below this cosine a face is met too flatly.
+const float FLAT = 1e-4;
+
+// Whether a ray enters the shell at `place` as it should, there and not later; and how deep.
+bool enters(uint place, vec3 ray, out float depth) {
+    vec4 face = plane_at(place);
+    float towards_inside = dot(face.xyz, ray);
+    depth = face.w / towards_inside;
+    if (!(towards_inside > FLAT * length(ray))) return false;
+    for (uint i = 1; i < 4; i++) {
+        vec4 plane = plane_at((place & ~3u) | ((place + i) & 3));
+        towards_inside = dot(plane.xyz, ray);
+        if (towards_inside > 0.0 && plane.w > depth * (1.0 + STRAY) * towards_inside) return false;
+    }
+    return true;
+}
+
+// Whether a ray that leaves the shell by `exit`, after this depth, leaves it as it should: at `leave`, or as deep.
+bool leaves(float depth, uint exit, uint leave, vec3 ray) {
+    vec4 face = plane_at(leave);
+    float towards_inside = dot(face.xyz, ray);
+    return -towards_inside > FLAT * length(ray)
+        && (exit == leave || depth > face.w / towards_inside * (1.0 - STRAY));
 }
 
 // Where a ray leaves the tetrahedron that it has entered at `place`, and how deep; NOWHERE where rounding, or want of volume,
@@ -89,11 +117,11 @@ uint entry_of(uint place, vec3 ray, out float depth) {
 // From where a ray leaves the shell back to where it begins in it, before the near plane; NOWHERE if it begins outside.
 uint back_to_start(uint place, vec3 ray, inout uint passes) {
     float depth = 0.0;
-    do {
+    while (place != NOWHERE && passes < MOST_PASSES) {
         passes++;
         place = entry_of(place, ray, depth);
         if (place == NOWHERE || depth <= view.near) break;
         place = texelFetch(beyond, int(place)).x;
-    } while (place != NOWHERE && passes < MOST_PASSES);
+    }
     return place;
 }

@@ -15,7 +15,7 @@
 
 mod abuffer;
 pub mod check;
-pub mod entries;
+pub mod crossings;
 mod gaps;
 pub mod relations;
 pub mod search;
@@ -24,7 +24,7 @@ pub mod sxmpvo;
 use std::ops::Range;
 
 pub use check::{Check, check, check_pixels};
-pub use entries::Entries;
+pub use crossings::Crossings;
 pub use sxmpvo::{Sorted, Sorter, Times, sort};
 
 /// A visibility order of all tetrahedra of a shell for one view.

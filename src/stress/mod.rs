@@ -20,7 +20,7 @@ use serde::Serialize;
 use crate::Result;
 use crate::frame::{Frame, Image};
 use crate::method::{self, Method, Setup};
-use crate::scene::{Scene, View};
+use crate::scene::{Scene, Traversal, View};
 
 /// How much of a case is run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -106,13 +106,16 @@ impl Stand<'_> {
         self.prepare(scene)?.render(&scene.view)
     }
 
-    /// The worst [`excess`](compare::excess) of several views of a scene.
+    /// The worst [`excess`](compare::excess) of several views of a scene, walked and sorted.
     fn excess(&self, scene: &Arc<Scene>, views: &[View]) -> Result<f64> {
-        let mut method = self.prepare(scene)?;
         let mut worst = 0.0f64;
-        for view in views {
-            let image = method.render(view)?.image;
-            worst = worst.max(compare::excess(scene, view, &image));
+        for traversal in [Traversal::Walk, Traversal::Sort] {
+            let scene = Arc::new(Scene { traversal, ..(**scene).clone() });
+            let mut method = self.prepare(&scene)?;
+            for view in views {
+                let image = method.render(view)?.image;
+                worst = worst.max(compare::excess(&scene, view, &image));
+            }
         }
         Ok(worst)
     }

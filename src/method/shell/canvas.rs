@@ -4,7 +4,7 @@ use super::constants::{ViewConstants, constants_of_volume};
 use super::lit::{Lit, LitView, Sight as LitSight};
 use super::seen::{Run, Seen};
 use super::solids::SolidView;
-use super::walk::{self, Starts, Ways};
+use super::walk::{self, RayBuffers, Ways};
 use super::{Shell, Sight};
 use crate::gpu::{Batch, Buffer, Keeps, Pipeline, PipelineInfo, Target, shaders};
 use crate::scene::{Model, View};
@@ -35,7 +35,7 @@ enum Medium {
         pipeline: Pipeline,
         /// For rays that are in several parts of the shell at once, where there are any.
         together: Option<Pipeline>,
-        starts: Starts,
+        rays: RayBuffers,
     },
 }
 
@@ -49,9 +49,9 @@ impl Canvas {
         let mut buffers = Vec::new();
         match &self.medium {
             Medium::Sorted { tiles, list, .. } => buffers.extend([(0, &self.cells), (1, tiles), (2, list)]),
-            Medium::Walked { starts, .. } => {
+            Medium::Walked { rays, .. } => {
                 buffers.push((18, &self.cells));
-                buffers.extend(starts.buffers());
+                buffers.extend(rays.buffers());
                 buffers.extend(ways.map(|ways| (19, ways.beyond())));
             }
         }
@@ -121,7 +121,7 @@ impl Shell {
                     tiles.refill(&seen.tiles)?;
                     list.refill(&seen.list)?;
                 }
-                (Medium::Walked { starts, .. }, Sight::Walked(entries)) => starts.refill(entries)?,
+                (Medium::Walked { rays, .. }, Sight::Walked(crossings)) => rays.refill(crossings)?,
                 (Medium::Walked { .. }, Sight::Sorted(_)) => unreachable!("a canvas of another kind"),
             }
         }
@@ -149,7 +149,7 @@ impl Shell {
         let shading = self.scene.shading.as_ref();
         let fibre = shading.is_some_and(|shading| shading.model == Model::Fibre);
         let glow = shading.is_some_and(|shading| shading.emission.glow > 0.0);
-        let inside = matches!(sight, Sight::Walked(entries) if entries.begun_inside > 0);
+        let inside = matches!(sight, Sight::Walked(crossings) if crossings.begun_inside > 0);
         constants.extend([fibre, glow, inside].map(u32::from));
         CanvasKind {
             width: view.width,
@@ -157,7 +157,7 @@ impl Shell {
             depth: view.depth,
             cycles: match sight {
                 Sight::Sorted(_) => !seen.tiles.is_empty(),
-                Sight::Walked(entries) => entries.overlapping > 0,
+                Sight::Walked(crossings) => crossings.overlapping > 0,
             },
             walks: matches!(sight, Sight::Walked(_)),
             switches: switches.into_iter().filter_map(|(name, is_on)| is_on.then_some(name)).collect(),
@@ -211,7 +211,7 @@ impl Shell {
                 };
                 (Buffer::storage(&self.gpu, "the tetrahedra", &seen.cells)?, medium)
             }
-            Sight::Walked(entries) => {
+            Sight::Walked(crossings) => {
                 let walked = PipelineInfo {
                     vertex: shaders::WALK_VERT.with(on),
                     fragment: shaders::WALK_FRAG.with(on),
@@ -221,9 +221,9 @@ impl Shell {
                 let of_several = PipelineInfo { fragment: shaders::TOGETHER_FRAG.with(on), ..walked };
                 let together = kind.cycles.then(|| Pipeline::new(&self.gpu, &target, &of_several));
                 let together = together.transpose()?;
-                let starts = Starts::new(&self.gpu, entries)?;
+                let rays = RayBuffers::new(&self.gpu, crossings)?;
                 let cells = Buffer::floats(&self.gpu, "the tetrahedra", &seen.cells)?;
-                (cells, Medium::Walked { pipeline, together, starts })
+                (cells, Medium::Walked { pipeline, together, rays })
             }
         };
         let solids = self.solids.as_ref().map(|_| {

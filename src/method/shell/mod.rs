@@ -33,7 +33,7 @@ use self::walk::Ways;
 use super::{Method, Setup};
 use crate::frame::{Frame, Image, Stopwatch};
 use crate::gpu::{Batch, Draw, Gpu, Sampled, Texture3d, draw};
-use crate::order::{Entries, Sorted, Sorter};
+use crate::order::{Crossings, Sorted, Sorter};
 use crate::progress::{Interrupt, Progress};
 use crate::scene::{March, Scene, Sizes, Traversal, View, span};
 use crate::shell::{self, Topology};
@@ -79,7 +79,7 @@ enum Sight {
     /// All rays in one.
     Sorted(Sorted),
     /// Each by itself, from where it enters.
-    Walked(Entries),
+    Walked(Crossings),
 }
 
 /// A device without a scene.
@@ -186,7 +186,7 @@ impl Method for Shell {
                     true => {
                         self.progress.stage("finding where rays enter");
                         let ways = ways(&mut self.ways, &self.scene.shell);
-                        Sight::Walked(Entries::new(ways.faces(), &self.scene.shell, view))
+                        Sight::Walked(Crossings::new(ways.faces(), &self.scene.shell, view))
                     }
                     false => {
                         self.progress.stage("sorting the tetrahedra");

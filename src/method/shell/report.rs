@@ -22,10 +22,10 @@ impl Shell {
                 count("cycles", sorted.order.cycles.len() as u64);
                 count("tetrahedra_in_cycles", sorted.cycle_members);
             }
-            Sight::Walked(entries) => {
-                count("entries", entries.places.len() as u64);
-                count("pixels_begun_inside", entries.begun_inside);
-                count("pixels_overlapping", entries.overlapping);
+            Sight::Walked(crossings) => {
+                count("crossings", crossings.places.len() as u64);
+                count("pixels_begun_inside", crossings.begun_inside);
+                count("pixels_overlapping", crossings.overlapping);
             }
         }
         count("pixels_covered", rgba.iter().filter(|pixel| pixel[3] > 0.0).count() as u64);

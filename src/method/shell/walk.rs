@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use crate::Result;
 use crate::gpu::{Buffer, Gpu};
-use crate::order::Entries;
+use crate::order::Crossings;
 use crate::order::relations::FaceTable;
 use crate::shell::{Shell, Topology};
 
@@ -65,21 +65,21 @@ impl Ways {
     }
 }
 
-/// Where rays enter, on the device.
-pub struct Starts {
+/// Where rays enter the shell and leave it, on the device.
+pub struct RayBuffers {
     first: Buffer,
     places: Buffer,
 }
 
-impl Starts {
+impl RayBuffers {
     /// Uploads them.
     ///
     /// # Errors
     /// As [`Buffer::numbers`].
-    pub fn new(gpu: &Arc<Gpu>, entries: &Entries) -> Result<Self> {
+    pub fn new(gpu: &Arc<Gpu>, crossings: &Crossings) -> Result<Self> {
         Ok(Self {
-            first: Buffer::numbers(gpu, "the pixels' entries", &entries.first)?,
-            places: Buffer::numbers(gpu, "where rays enter", &entries.places)?,
+            first: Buffer::numbers(gpu, "the pixels' crossings", &crossings.first)?,
+            places: Buffer::numbers(gpu, "where rays cross the boundary", &crossings.places)?,
         })
     }
 
@@ -87,9 +87,9 @@ impl Starts {
     ///
     /// # Errors
     /// As [`Buffer::numbers`].
-    pub fn refill(&mut self, entries: &Entries) -> Result<()> {
-        self.first.refill(&entries.first)?;
-        self.places.refill(&entries.places)
+    pub fn refill(&mut self, crossings: &Crossings) -> Result<()> {
+        self.first.refill(&crossings.first)?;
+        self.places.refill(&crossings.places)
     }
 
     /// By the binding that shaders name.
