@@ -1,6 +1,6 @@
 #version 450
 #extension GL_ARB_shading_language_include : require
-// switches: DEPTH SOLIDS LIT SHADOWS(LIT)
+// switches: DEPTH SOLIDS SPARSE LIT SHADOWS(LIT)
 // Walks the ray of each pixel through the shell, front to back, from every place where it enters. A pixel that is too much for
 // that is left to the host: it becomes infinite.
 
@@ -36,43 +36,62 @@ void main() {
     uint passes = 0;
     bool strays = false;
     if (is_begun) place = back_to_start(texelFetch(crossings, next).x & ~LEAVES, ray, passes);
+    // Of the tetrahedron that the ray is in.
+    uint cell = 0;
+    Path path = Path(vec3(0.0), vec3(0.0), 0.0);
+    Steps steps = no_steps();
+    uint first = 0;
+    bool is_done = false;
     while (!strays && passes < MOST_PASSES) {
-        passes++;
-        if (place == NOWHERE) {
-            if (next == last) break;
-            uint crossing = texelFetch(crossings, next++).x;
-            if ((crossing & LEAVES) != 0) continue;
-            place = crossing;
+        // On to the next in which something may be seen. Where several pixels run at once, all of them wait here for one another, and
+        // march together then.
+        while (passes < MOST_PASSES) {
+            passes++;
+            first = 0;
+            steps.count = 0;
+            if (place == NOWHERE) {
+                is_done = next == last;
+                if (is_done) break;
+                uint crossing = texelFetch(crossings, next++).x;
+                if ((crossing & LEAVES) != 0) continue;
+                place = crossing;
+                float depth;
+                strays = strays || !enters(place, ray, depth);
+                from = max(from, depth);
+            }
+            cell = place >> 2;
             float depth;
-            strays = strays || !enters(place, ray, depth);
-            from = max(from, depth);
+            uint exit = exit_of(place, ray, depth);
+            vec2 segment = vec2(from, min(depth, farthest));
+            if (exit != NOWHERE && segment.y > segment.x) {
+                vec4 rows[3];
+                texture_of(cell, rows);
+                path = path_in(rows, ray);
+                steps = steps_of(path, segment);
+                passes += PASSES_A_STEP * steps.count;
+                first = seek(path, steps, 0);
+                from = segment.y;
+            }
+            is_done = from >= farthest;
+            place = exit == NOWHERE || is_done ? NOWHERE : texelFetch(beyond, int(exit)).x;
+            if (place == NOWHERE && !is_done && next < last) {
+                uint leave = texelFetch(crossings, next).x;
+                if ((leave & LEAVES) != 0) {
+                    next++;
+                    strays = strays || !leaves(from, exit, leave & ~LEAVES, ray);
+                }
+            }
+            if (first < steps.count || is_done || strays) break;
         }
-        float depth;
-        uint exit = exit_of(place, ray, depth);
-        vec2 segment = vec2(from, min(depth, farthest));
-        if (exit != NOWHERE && segment.y > segment.x) {
-            vec4 rows[3];
-            texture_of(place >> 2, rows);
-            Path path = path_in(rows, ray);
-            uint samples = sample_count(path, segment.x, segment.y);
-            passes += samples;
+        if (first < steps.count) {
 #ifdef LIT
             vec4 planes[4];
-            planes_of(place >> 2, planes);
-            enter(place >> 2, planes, ray);
+            planes_of(cell, planes);
+            enter(cell, planes, ray);
 #endif
-            march_midpoints(path, segment, per_depth, samples, light);
-            from = segment.y;
+            march_midpoints(path, steps, first, per_depth, light);
         }
-        if (from >= farthest || transmittance(light.gathered) <= SATURATED) break;
-        place = exit == NOWHERE ? NOWHERE : texelFetch(beyond, int(exit)).x;
-        if (place == NOWHERE && next < last) {
-            uint leave = texelFetch(crossings, next).x;
-            if ((leave & LEAVES) != 0) {
-                next++;
-                strays = strays || !leaves(from, exit, leave & ~LEAVES, ray);
-            }
-        }
+        if (is_done || transmittance(light.gathered) <= SATURATED) break;
     }
     bool is_left = strays || passes >= MOST_PASSES;
     out_rgba = is_left ? vec4(uintBitsToFloat(0x7f800000u)) : light.gathered.rgba;

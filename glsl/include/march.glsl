@@ -20,20 +20,19 @@ vec3 emitted(vec4 texel, float amount) {
     return texel.a > LEAST ? texel.rgb * (amount / texel.a) : vec3(0.0);
 }
 
-// Midpoint rule: the texture is constant over a step, and the exponential is exact.
-void march_midpoints(Path path, vec2 segment, float per_depth, uint count, inout Light light) {
-    float step = (segment.y - segment.x) / float(count);
-    // There is at least one. Where several pixels run at once, a test at the end costs no pass that nobody needs; but a loop whose only
-    // end that is lavapipe 22.3 gets wrong: what a pixel that is done has summed is summed again, in part, as the others go on. So
-    // it has another, which is never come to.
-    for (uint i = 0; i <= 65535;) {
-        float z = segment.x + (float(i) + 0.5) * step;
+// Midpoint rule over the steps from number `i` on: the texture is constant over a step, and the exponential is exact.
+void march_midpoints(Path path, Steps steps, uint i, float per_depth, inout Light light) {
+    // Where several pixels run at once, a test at the end costs no pass that nobody needs; but a loop whose only end that is lavapipe
+    // 22.3 gets wrong: what a pixel that is done has summed is summed again, in part, as the others go on. So it has another at the top.
+    for (; i < steps.count;) {
+        float z = middle(steps, i);
         vec4 texel = radiant(path, z);
-        float optical = extinction(texel) * max(step * per_depth, LEAST);
+        float optical = extinction(texel) * max(steps.size * per_depth, LEAST);
         float alpha = opacity(optical);
         light.depth += transmittance(light.gathered) * alpha * z;
         lay_behind(light.gathered, vec4(emitted(texel, alpha), alpha));
-        if (++i >= count) break;
+        i = seek(path, steps, i + 1);
+        if (i >= steps.count) break;
     }
 }
 
@@ -129,6 +128,10 @@ void march_exactly(Path path, vec2 segment, float per_depth, inout Light light) 
 
 // A wall stops the ray however short the step: `LEAST` keeps infinity times nothing from being no number.
 void march(Path path, vec2 segment, float per_depth, inout Light light) {
-    if (PLAN == PLAN_EXACT) march_exactly(path, segment, max(per_depth, LEAST), light);
-    else march_midpoints(path, segment, per_depth, sample_count(path, segment.x, segment.y), light);
+    if (PLAN == PLAN_EXACT) {
+        march_exactly(path, segment, max(per_depth, LEAST), light);
+    } else {
+        Steps steps = steps_of(path, segment);
+        march_midpoints(path, steps, seek(path, steps, 0), per_depth, light);
+    }
 }

@@ -1,5 +1,6 @@
 //! 3D textures with mip levels, sampled linearly: u and v repeat, w clamps to the edge.
 
+use std::borrow::Cow;
 use std::sync::Arc;
 
 use ash::vk;
@@ -9,7 +10,7 @@ use super::device::{Gpu, vulkan_error};
 use super::format::Rgba;
 use super::image::{DeviceImage, whole};
 use super::submit::submit;
-use crate::volume::{Directions, Pyramid};
+use crate::volume::{Directions, Proximity, Pyramid};
 use crate::{Error, Result};
 
 /// A mip pyramid on the device, with its sampler.
@@ -36,8 +37,8 @@ const SAMPLING: Use = (
     vk::PipelineStageFlags::FRAGMENT_SHADER,
 );
 
-/// A mip level: its size, and its texels, u fastest.
-type Level<'a> = ([u32; 3], &'a [[f32; 4]]);
+/// A mip level: its size, and its texels as `T`, u fastest.
+type Level<'a, T> = ([u32; 3], &'a [T]);
 
 impl Texture3d {
     /// Uploads all levels in the most accurate format that the device filters linearly.
@@ -48,9 +49,9 @@ impl Texture3d {
     /// # Panics
     /// Where the pyramid has no level, or levels of other sizes than a [`Pyramid`] promises.
     pub fn upload(gpu: &Arc<Gpu>, name: &'static str, pyramid: &Pyramid) -> Result<Self> {
-        let levels: Vec<Level<'_>> =
+        let levels: Vec<Level<'_, _>> =
             pyramid.levels.iter().map(|level| (level.size, level.texels.as_slice())).collect();
-        Self::upload_levels(gpu, name, &levels)
+        Self::upload_colours(gpu, name, &levels)
     }
 
     /// The same for directions.
@@ -61,20 +62,50 @@ impl Texture3d {
     /// # Panics
     /// As [`Texture3d::upload`].
     pub fn upload_directions(gpu: &Arc<Gpu>, name: &'static str, directions: &Directions) -> Result<Self> {
-        let levels: Vec<Level<'_>> =
+        let levels: Vec<Level<'_, _>> =
             directions.levels.iter().map(|level| (level.size, level.texels.as_slice())).collect();
-        Self::upload_levels(gpu, name, &levels)
+        Self::upload_colours(gpu, name, &levels)
     }
 
-    fn upload_levels(gpu: &Arc<Gpu>, name: &'static str, pyramid: &[Level<'_>]) -> Result<Self> {
-        assert_is_pyramid(pyramid);
+    /// Uploads distances, 1 to 255 read as parts of 255, of the box that a sample is in.
+    ///
+    /// # Errors
+    /// As [`Texture3d::upload`].
+    ///
+    /// # Panics
+    /// As [`Texture3d::upload`].
+    pub fn upload_proximity(gpu: &Arc<Gpu>, name: &'static str, proximity: &Proximity) -> Result<Self> {
+        let levels: Vec<Level<'_, u8>> =
+            proximity.levels.iter().map(|level| (level.size, level.distances.as_slice())).collect();
+        assert_is_pyramid(&levels);
+        Self::check_sides(gpu, name, levels[0].0)?;
+        // Vulkan has every device sample this format.
+        Self::upload_levels(gpu, name, vk::Format::R8_UNORM, vk::Filter::NEAREST, &levels, |texels| Cow::Borrowed(texels))
+    }
+
+    fn upload_colours(gpu: &Arc<Gpu>, name: &'static str, levels: &[Level<'_, [f32; 4]>]) -> Result<Self> {
+        assert_is_pyramid(levels);
+        let count = u32::try_from(levels.len()).expect("at most 32 levels");
+        let (format, _) = Self::check(gpu, name, levels[0].0, count)?;
+        Self::upload_levels(gpu, name, format.raw(), vk::Filter::LINEAR, levels, |texels| format.encode(texels))
+    }
+
+    fn upload_levels<T>(
+        gpu: &Arc<Gpu>,
+        name: &'static str,
+        format: vk::Format,
+        filter: vk::Filter,
+        pyramid: &[Level<'_, T>],
+        encode: impl for<'a> Fn(&'a [T]) -> Cow<'a, [u8]>,
+    ) -> Result<Self> {
         let [width, height, depth] = pyramid[0].0;
         let levels = u32::try_from(pyramid.len()).expect("at most 32 levels");
-        let (format, bytes) = Self::check(gpu, name, pyramid[0].0, levels)?;
+        let encoded: Vec<Cow<'_, [u8]>> = pyramid.iter().map(|(_, texels)| encode(texels)).collect();
+        let bytes = encoded.iter().map(|texels| texels.len() as u64).sum();
         let mut staging = Buffer::staging(gpu, name, bytes)?;
         let info = vk::ImageCreateInfo::default()
             .image_type(vk::ImageType::TYPE_3D)
-            .format(format.raw())
+            .format(format)
             .extent(vk::Extent3D { width, height, depth })
             .mip_levels(levels)
             .array_layers(1)
@@ -86,7 +117,7 @@ impl Texture3d {
 
         let mut regions = Vec::new();
         let mut offset = 0;
-        for (level, (size, texels)) in (0..levels).zip(pyramid) {
+        for ((level, (size, _)), texels) in (0..levels).zip(pyramid).zip(&encoded) {
             let [width, height, depth] = *size;
             regions.push(
                 vk::BufferImageCopy::default()
@@ -99,8 +130,7 @@ impl Texture3d {
                     })
                     .image_extent(vk::Extent3D { width, height, depth }),
             );
-            let texels = format.encode(texels);
-            staging.write_bytes(offset, &texels);
+            staging.write_bytes(offset, texels);
             offset += texels.len();
         }
         submit(gpu, "uploading the volume", |commands| {
@@ -113,8 +143,8 @@ impl Texture3d {
             transition(gpu, commands, &image, COPY, SAMPLING);
         })?;
         let sampler_info = vk::SamplerCreateInfo::default()
-            .mag_filter(vk::Filter::LINEAR)
-            .min_filter(vk::Filter::LINEAR)
+            .mag_filter(filter)
+            .min_filter(filter)
             .mipmap_mode(vk::SamplerMipmapMode::NEAREST)
             .address_mode_u(vk::SamplerAddressMode::REPEAT)
             .address_mode_v(vk::SamplerAddressMode::REPEAT)
@@ -126,19 +156,24 @@ impl Texture3d {
         Ok(Self { image, sampler, gpu: gpu.clone() })
     }
 
-    /// Whether the device can hold a pyramid above `size` texels: in which format, and of how many bytes.
-    pub(super) fn check(gpu: &Gpu, name: &str, size: [u32; 3], levels: u32) -> Result<(Rgba, u64)> {
+    fn check_sides(gpu: &Gpu, name: &str, size: [u32; 3]) -> Result<()> {
         let [width, height, depth] = size;
         let limit = gpu.limits.max_image_dimension3_d;
-        if width.max(height).max(depth) > limit {
-            return Err(Error::Device {
-                message: format!(
-                    "{name}: {width} x {height} x {depth} texels; {} takes 3D textures of at most {limit} a side",
-                    gpu.info().name
-                ),
-                help: Some("use a smaller volume or another device".into()),
-            });
+        if width.max(height).max(depth) <= limit {
+            return Ok(());
         }
+        Err(Error::Device {
+            message: format!(
+                "{name}: {width} x {height} x {depth} texels; {} takes 3D textures of at most {limit} a side",
+                gpu.info().name
+            ),
+            help: Some("use a smaller volume or another device".into()),
+        })
+    }
+
+    /// Whether the device can hold a pyramid above `size` texels: in which format, and of how many bytes.
+    pub(super) fn check(gpu: &Gpu, name: &str, size: [u32; 3], levels: u32) -> Result<(Rgba, u64)> {
+        Self::check_sides(gpu, name, size)?;
         let features =
             vk::FormatFeatureFlags::SAMPLED_IMAGE_FILTER_LINEAR | vk::FormatFeatureFlags::TRANSFER_DST;
         let format = Rgba::best(gpu, features).ok_or_else(|| Error::Device {
@@ -155,7 +190,7 @@ impl Texture3d {
 }
 
 /// Each level has the size that Vulkan gives a mip level, and as many texels.
-fn assert_is_pyramid(pyramid: &[Level<'_>]) {
+fn assert_is_pyramid<T>(pyramid: &[Level<'_, T>]) {
     let full = pyramid[0].0;
     assert!(full.into_iter().all(|side| side > 0), "a volume of {full:?} texels");
     let most = most_levels(full);

@@ -7,7 +7,7 @@ use super::solids::SolidView;
 use super::walk::{self, RayBuffers, Ways};
 use super::{Shell, Sight};
 use crate::gpu::{Batch, Buffer, Keeps, Pipeline, PipelineInfo, Target, shaders};
-use crate::scene::{Model, View};
+use crate::scene::{March, Model, View};
 use crate::{Error, Result};
 
 /// The target of a picture and the pipeline that draws into it.
@@ -142,6 +142,7 @@ impl Shell {
         let switches = [
             ("DEPTH", view.depth),
             ("SOLIDS", self.solids.is_some()),
+            ("SPARSE", self.volume.is_sparse() && self.scene.march != March::Exact),
             ("LIT", self.lit.is_some()),
             ("SHADOWS", self.shadows().is_some()),
         ];
@@ -176,6 +177,7 @@ impl Shell {
                 "LIT" => (&[5], &[3, 4], &[9]),
                 "SHADOWS" => (&[6], &[], &[10, 11, 12, 13]),
                 "SOLIDS" => (&[], &[], &[15]),
+                "SPARSE" => (&[], &[], &[22]),
                 _ => (&[], &[], &[]),
             };
             buffers.extend(more_buffers);

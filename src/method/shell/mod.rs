@@ -17,6 +17,7 @@ pub mod seen;
 pub mod shadows;
 pub mod solids;
 mod update;
+mod volume;
 mod walk;
 
 use std::sync::Arc;
@@ -29,10 +30,11 @@ use self::lit::{Lit, LitView};
 use self::seen::Seen;
 use self::shadows::Shadows;
 use self::solids::Solids;
+use self::volume::DeviceVolume;
 use self::walk::Ways;
 use super::{Method, Setup};
 use crate::frame::{Frame, Image, Stopwatch};
-use crate::gpu::{Batch, Draw, Gpu, Sampled, Texture3d, draw};
+use crate::gpu::{Batch, Draw, Gpu, Sampled, draw};
 use crate::order::{Crossings, Sorted, Sorter};
 use crate::progress::{Interrupt, Progress};
 use crate::scene::{March, Scene, Sizes, Traversal, View, span};
@@ -49,7 +51,7 @@ struct Shell {
     sorter: Option<(Arc<Topology>, Sorter)>,
     /// Once they were needed.
     ways: Option<Ways>,
-    volume: Texture3d,
+    volume: DeviceVolume,
     /// In a lit scene.
     lit: Option<Lit>,
     /// Once they were needed, and if a light casts any.
@@ -113,7 +115,7 @@ impl super::Opened for Opened {
         let Self { gpu, progress, interrupt } = *self;
         let texels = longest_span(&scene)?;
         progress.stage("uploading the volume");
-        let volume = Texture3d::upload(&gpu, "the volume", &scene.volume)?;
+        let volume = DeviceVolume::new(&gpu, &scene.volume)?;
         let lit = scene.shading.as_ref().map(|shading| Lit::new(&gpu, &scene.shell, shading)).transpose()?;
         let solids = Solids::new(&gpu, &scene.solids)?;
         Ok(Box::new(Shell {
@@ -225,7 +227,7 @@ impl Method for Shell {
         let keeps_shadows = self.shadows.is_some();
         if !keeps_shadows {
             let shadows =
-                Shadows::draw(&self.gpu, &self.scene, &self.volume, &*self.progress, &self.interrupt)?;
+                Shadows::draw(&self.gpu, &self.scene, &self.volume.texture, &*self.progress, &self.interrupt)?;
             if shadows.is_some() {
                 watch.lap("shadows");
             }
@@ -264,7 +266,7 @@ impl Method for Shell {
         }
         self.interrupt.check()?;
         self.progress.stage("marching");
-        let mut textures = vec![(8, Sampled::Texture(&self.volume))];
+        let mut textures = self.volume.textures();
         textures.extend(self.lit.as_ref().map(|lit| (9, Sampled::Texture(&lit.directions))));
         textures.extend(shadow_textures);
         let mut batches = canvas.batches(&seen);

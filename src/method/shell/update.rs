@@ -4,9 +4,9 @@ use std::sync::Arc;
 
 use super::lit::Lit;
 use super::solids::{self, Solids};
+use super::volume::DeviceVolume;
 use super::{Shell, longest_span};
 use crate::Result;
-use crate::gpu::Texture3d;
 use crate::scene::Scene;
 
 impl Shell {
@@ -31,7 +31,7 @@ impl Shell {
             None
         } else {
             self.progress.stage("uploading the volume");
-            Some(Texture3d::upload(&self.gpu, "the volume", &scene.volume)?)
+            Some(DeviceVolume::new(&self.gpu, &scene.volume)?)
         };
         let same_directions = match (&before.shading, &scene.shading) {
             (Some(a), Some(b)) => Arc::ptr_eq(&a.directions, &b.directions) && a.model == b.model,

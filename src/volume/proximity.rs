@@ -1,0 +1,225 @@
+//! How far the nearest texel that is seen is from each place in a texture: so far a ray need not look. D. Cohen, Z. Sheffer,
+//! *Proximity clouds, an acceleration technique for 3D grid traversal*, 1994; distances are those of the greatest axis.
+
+use rayon::prelude::*;
+
+use super::{Pyramid, Volume};
+
+/// No distance is more, in texels. Longer leaps save little: each spares but one more look.
+const FARTHEST: u8 = 16;
+
+/// Distances of places to what is seen, for each level of a [`Pyramid`].
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Proximity {
+    /// From the level of the full volume on.
+    pub levels: Vec<ProximityLevel>,
+}
+
+/// The distances at one level of detail.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ProximityLevel {
+    /// As that of the level: texels along u, v, w.
+    pub size: [u32; 3],
+    /// Of each texel's box, u fastest, then v, then w: 0 where a sample in it may see something, at this level, the next finer or the
+    /// next coarser; else the distance, in texels of this level along the axis where it is greatest, of the nearest box where one may.
+    /// u and v repeat. At most 16, also where there is none.
+    pub distances: Vec<u8>,
+}
+
+/// A number for each box of a grid, u fastest.
+type Boxes = Vec<u8>;
+
+impl Proximity {
+    /// Of all levels of `pyramid`.
+    pub fn new(pyramid: &Pyramid) -> Self {
+        let seen: Vec<Boxes> = pyramid.levels.iter().map(seen).collect();
+        let levels = 0..pyramid.levels.len();
+        let levels = levels.map(|level| {
+            let size = pyramid.levels[level].size;
+            let mut near = vec![0; seen[level].len()];
+            for other in level.saturating_sub(1)..pyramid.levels.len().min(level + 2) {
+                let within = reached(&seen[other], pyramid.levels[other].size, size);
+                near.iter_mut().zip(within).for_each(|(near, within)| *near |= within);
+            }
+            ProximityLevel { size, distances: distances(&near, size) }
+        });
+        Self { levels: levels.collect() }
+    }
+
+    /// The part, 0..1, of the full volume's boxes in which nothing is seen.
+    pub fn emptiness(&self) -> f64 {
+        let distances = &self.levels[0].distances;
+        distances.iter().filter(|distance| **distance > 0).count() as f64 / distances.len() as f64
+    }
+}
+
+/// Where alpha is more than 0.
+fn seen(level: &Volume) -> Boxes {
+    level.texels.par_iter().map(|texel| u8::from(texel[3] > 0.0)).collect()
+}
+
+/// For boxes of a grid of `size`, whether linear interpolation in them reads any of the texels that are true, of a level of another
+/// size.
+fn reached(texels: &[u8], of_size: [u32; 3], size: [u32; 3]) -> Boxes {
+    let mut from = of_size;
+    let mut boxes = texels.to_vec();
+    for axis in 0..3 {
+        let read: Vec<Vec<usize>> = (0..size[axis]).map(|i| support(i, size[axis], from[axis], axis)).collect();
+        let before = from.map(|side| side as usize);
+        from[axis] = size[axis];
+        boxes = by_row(from, |[v, w], row| {
+            let line = |v: usize, w: usize| &boxes[(w * before[1] + v) * before[0]..][..before[0]];
+            match axis {
+                0 => {
+                    let own = line(v, w);
+                    row.iter_mut().zip(&read).for_each(|(seen, read)| *seen = read.iter().fold(0, |any, &u| any | own[u]));
+                }
+                1 => read[v].iter().for_each(|&v| raise(row, line(v, w))),
+                _ => read[w].iter().for_each(|&w| raise(row, line(v, w))),
+            }
+        });
+    }
+    boxes
+}
+
+/// A grid of `size`, of which each row along u is filled in by `fill`, which is told where it is along v and w.
+fn by_row(size: [u32; 3], fill: impl Fn([usize; 2], &mut [u8]) + Sync) -> Boxes {
+    let [width, height, depth] = size.map(|side| side as usize);
+    let mut boxes = vec![0; width * height * depth];
+    boxes.par_chunks_mut(width).enumerate().for_each(|(row, boxes)| fill([row % height, row / height], boxes));
+    boxes
+}
+
+/// To the greater of both, box by box.
+fn raise(row: &mut [u8], other: &[u8]) {
+    row.iter_mut().zip(other).for_each(|(a, b)| *a = (*a).max(*b));
+}
+
+/// The texels, of `texels` along an axis, that interpolation reads in box `i` of `boxes`.
+fn support(i: u32, boxes: u32, texels: u32, axis: usize) -> Vec<usize> {
+    // More than the rounding of texture coordinates in f32, which may take a sample into the neighbouring box.
+    const MARGIN: f64 = 1e-2;
+    let scale = f64::from(texels) / f64::from(boxes);
+    let low = (f64::from(i) * scale - 0.5 - MARGIN).floor() as i64;
+    let high = (f64::from(i + 1) * scale - 0.5 + MARGIN).floor() as i64 + 1;
+    let last = i64::from(texels) - 1;
+    // Once round is all there is.
+    let index = |j: i64| if axis < 2 { j.rem_euclid(last + 1) } else { j.clamp(0, last) };
+    (low..=high.min(low + last)).map(|j| index(j) as usize).collect()
+}
+
+/// Of each box to the nearest that is true.
+fn distances(near: &[u8], size: [u32; 3]) -> Boxes {
+    // How far what is true still reaches: one less from box to box, over corners too.
+    let mut reach: Boxes = near.iter().map(|near| near * FARTHEST).collect();
+    for _ in 0..FARTHEST {
+        let mut next = reach.clone();
+        for axis in 0..3 {
+            next = spread(&next, size, axis);
+        }
+        next.iter_mut().zip(near).for_each(|(next, near)| *next = next.saturating_sub(1 - near));
+        let is_done = next == reach;
+        reach = next;
+        if is_done {
+            break;
+        }
+    }
+    reach.into_iter().map(|reach| FARTHEST - reach).collect()
+}
+
+/// The greatest of each box and its two neighbours along an axis.
+fn spread(boxes: &[u8], size: [u32; 3], axis: usize) -> Boxes {
+    let [width, height, depth] = size.map(|side| side as usize);
+    by_row(size, |[v, w], row| {
+        let line = |v: usize, w: usize| &boxes[(w * height + v) * width..][..width];
+        let own = line(v, w);
+        row.copy_from_slice(own);
+        match axis {
+            0 => {
+                raise(&mut row[1..], &own[..width - 1]);
+                raise(&mut row[..width - 1], &own[1..]);
+                raise(&mut row[..1], &own[width - 1..]);
+                raise(&mut row[width - 1..], &own[..1]);
+            }
+            1 => [(v + 1) % height, (v + height - 1) % height].iter().for_each(|&v| raise(row, line(v, w))),
+            _ => [(w + 1).min(depth - 1), w.saturating_sub(1)].iter().for_each(|&w| raise(row, line(v, w))),
+        }
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::RngExt as _;
+    use rand_pcg::Pcg64;
+
+    use super::*;
+    use crate::volume::Quantity;
+
+    fn pyramid(size: [u32; 3], seen: impl Fn([u32; 3]) -> bool) -> Pyramid {
+        let [width, height, depth] = size;
+        let places = (0..depth).flat_map(|w| (0..height).flat_map(move |v| (0..width).map(move |u| [u, v, w])));
+        let texels = places.map(|place| if seen(place) { [0.5; 4] } else { [0.0; 4] }).collect();
+        Pyramid::build(Volume::of(Quantity::Opacity, size, texels).unwrap())
+    }
+
+    /// Wherever a ray is and however it runs, along the greatest axis nothing is seen as far as is promised, at any of the levels that
+    /// a sample may read.
+    #[test]
+    fn nothing_is_seen_within_the_distance() {
+        let mut random = Pcg64::new(7, 11);
+        for size in [[32, 32, 16], [20, 33, 9], [64, 7, 1]] {
+            let holes = [random.random_range(0..size[0]), random.random_range(0..size[1]), random.random_range(0..size[2])];
+            let pyramid = pyramid(size, |[u, v, w]| [u / 2, v / 2, w] == [holes[0] / 2, holes[1] / 2, holes[2]]);
+            let proximity = Proximity::new(&pyramid);
+            let mut leaps = 0;
+            for _ in 0..20_000 {
+                let level = random.random_range(0..pyramid.levels.len().min(4));
+                let of = &proximity.levels[level];
+                assert_eq!(of.size, pyramid.levels[level].size);
+                let [nu, nv, nw] = of.size.map(f64::from);
+                let point = [random.random_range(0.0..1.0), random.random_range(0.0..1.0), random.random_range(0.0..1.0)];
+                let index = |at: f64, n: f64| (at * n).floor() as usize;
+                let at = (index(point[2], nw) * of.size[1] as usize + index(point[1], nv)) * of.size[0] as usize
+                    + index(point[0], nu);
+                let distance = of.distances[at];
+                if distance == 0 {
+                    continue;
+                }
+                leaps += 1;
+                let within = f64::from(distance - 1);
+                let moved: [f64; 3] = std::array::from_fn(|k| {
+                    let n = [nu, nv, nw][k];
+                    let moved = point[k] + random.random_range(-within..=within) / n;
+                    if k == 2 { moved.clamp(0.0, 1.0) } else { moved }
+                });
+                for other in level.saturating_sub(1)..pyramid.levels.len().min(level + 2) {
+                    let texel = pyramid.levels[other].sample(moved.into());
+                    assert_eq!(texel[3], 0.0, "{size:?}, level {level}: {point:?}, {distance}, {moved:?}");
+                }
+            }
+            assert!(leaps > 500, "{leaps}");
+        }
+    }
+
+    #[test]
+    fn distances_are_those_of_the_greatest_axis_and_u_and_v_repeat() {
+        let full = pyramid([40, 40, 40], |place| place == [1, 20, 30]);
+        let level = &Proximity::new(&full).levels[0];
+        let at = |u: usize, v: usize, w: usize| level.distances[(w * 40 + v) * 40 + u];
+        // The texel is read in the boxes beside its own, and half a coarser texel farther: one box more.
+        assert_eq!(at(1, 20, 30), 0);
+        let nearest = (2..10).find(|&u| at(u, 20, 30) > 0).unwrap();
+        assert!((3..=5).contains(&nearest), "{nearest}");
+        assert_eq!(at(nearest + 4, 20, 30), 5);
+        assert_eq!(at(nearest + 4, 22, 33), 5);
+        // Round the other way.
+        assert!((1..=7).contains(&at(36, 20, 30)), "{}", at(36, 20, 30));
+        assert_eq!(at(20, 0, 0), FARTHEST);
+    }
+
+    #[test]
+    fn a_dense_volume_is_near_everywhere() {
+        assert_eq!(Proximity::new(&pyramid([8, 8, 8], |_| true)).emptiness(), 0.0);
+        assert_eq!(Proximity::new(&pyramid([8, 8, 8], |_| false)).emptiness(), 1.0);
+    }
+}
