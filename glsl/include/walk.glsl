@@ -16,8 +16,7 @@ const uint LEAVES = 0x80000000u;
 const uint INTRICATE = 0x80000000u;
 const uint BEGUN = 0x40000000u;
 
-// Where less is let through the rest is not looked at.
-const float SATURATED = 9.5367431640625e-7; // 2^-20
+layout(constant_id = 6) const float SATURATED = 0.0; // where no more is let through the rest is not looked at
 
 // Passes through loops after which a pixel is left to the host. lavapipe runs eight pixels at once, all of them as often as the
 // one that needs it most, and ends all loops after 65,535 passes.

@@ -9,9 +9,9 @@ use clap::builder::{PossibleValue, PossibleValuesParser};
 use mesoshell::film::{FrameRange, Names};
 use mesoshell::frame::{Report, Stage, Stopwatch, file};
 use mesoshell::gpu::{DeviceChoice, Messages};
-use mesoshell::method::{self, METHODS, Setup};
+use mesoshell::method::{self, Choice, METHODS, Setup};
 use mesoshell::progress::{Interrupt, Progress};
-use mesoshell::scene::{self, Loaded, Sizes, View};
+use mesoshell::scene::{self, Loaded, Sizes, Skip, View};
 use mesoshell::value::PictureSize;
 use mesoshell::{Error, Result};
 use serde::Serialize;
@@ -48,6 +48,12 @@ pub struct Arguments {
     /// Set a key of the scene: -D shell.thickness=0.2; may be given more than once
     #[arg(short = 'D', value_name = "KEY=VALUE")]
     define: Vec<String>,
+    /// Do not leave this out, although it could be; may be given more than once
+    #[arg(long, value_name = "NAME", value_parser = skips())]
+    no_skip: Vec<String>,
+    /// Tell which way was chosen, what is left out, and why: before the picture is drawn, and what came of it after
+    #[arg(long)]
+    pub(super) explain: bool,
     #[command(flatten)]
     pub(super) accuracy: accuracy::Arguments,
     /// The device: its number in `mesoshell devices`, a part of its name, or its UUID
@@ -62,7 +68,8 @@ impl Arguments {
     /// What is laid over the scene.
     pub(super) fn overrides(&self) -> Vec<String> {
         let view = self.camera.iter().map(|name| format!("view={name:?}"));
-        self.define.iter().cloned().chain(view).collect()
+        let no_skip = (!self.no_skip.is_empty()).then(|| format!("march.no_skip={:?}", self.no_skip));
+        self.define.iter().cloned().chain(view).chain(no_skip).collect()
     }
 
     /// Pixels across and down, instead of the scene's.
@@ -90,6 +97,9 @@ struct Rendered {
     output: PathBuf,
     width: u32,
     height: u32,
+    /// With `--explain`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    plan: Option<Vec<Choice>>,
     /// With `--max-error`.
     #[serde(skip_serializing_if = "Option::is_none")]
     accuracy: Option<Accuracy>,
@@ -126,12 +136,13 @@ pub fn run(arguments: Arguments, talk: Talk) -> Result<ExitCode> {
         talk.warn(warning);
     }
     talk.result(&rendered, || {
-        let Rendered { output, width, height, accuracy, report, .. } = &rendered;
+        let Rendered { output, width, height, plan, accuracy, report, .. } = &rendered;
         let time = |stage: &Stage| format!("{:9.2} ms", stage.milliseconds);
         let stages = table(report.stages.iter().map(|stage| (stage.name.as_str(), time(stage))));
         let accuracy = accuracy.as_ref().map_or_else(String::new, Accuracy::told);
         let (method, device) = (&report.method, &report.device);
-        format!("{}\n{method} on {device}, {width}x{height}\n{accuracy}{stages}", output.display())
+        let explained = plan.as_ref().map_or_else(String::new, |plan| explain(plan, report));
+        format!("{}\n{method} on {device}, {width}x{height}\n{explained}{accuracy}{stages}", output.display())
     })?;
     let is_kept = rendered.accuracy.as_ref().is_none_or(Accuracy::is_kept);
     Ok(if is_kept { ExitCode::SUCCESS } else { ExitCode::from(1) })
@@ -177,6 +188,7 @@ fn render(arguments: &Arguments, progress: &Arc<dyn Progress>, interrupt: &Inter
     watch.lap("prepare");
     stages.extend(watch.finish());
 
+    let plan = arguments.explain.then(|| method.plan());
     let mut frame = method.render(&view)?;
     frame.report.warnings.extend(warning);
     drop(method);
@@ -194,7 +206,20 @@ fn render(arguments: &Arguments, progress: &Arc<dyn Progress>, interrupt: &Inter
     stages.extend(watch.finish());
     frame.report.stages = stages;
     let View { width, height, .. } = view;
-    Ok(Rendered { scene: scene.clone(), output, width, height, accuracy, report: frame.report })
+    Ok(Rendered { scene: scene.clone(), output, width, height, plan, accuracy, report: frame.report })
+}
+
+/// What was chosen, and what came of it.
+fn explain(plan: &[Choice], report: &Report) -> String {
+    let chosen = |choice: &Choice| format!("{:4}  {}", choice.chosen, choice.why);
+    let plan = table(plan.iter().map(|choice| (choice.about, chosen(choice))));
+    let counts = table(report.counts.iter().map(|(name, count)| (name.as_str(), format!("{count:9}"))));
+    let skipped: String = report.skipped.iter().map(|skipped| format!("  - {skipped}\n")).collect();
+    format!("chosen:\n{plan}\nleft out:\n{skipped}counted:\n{counts}\ntook:\n")
+}
+
+fn skips() -> PossibleValuesParser {
+    Skip::ALL.map(|skip| PossibleValue::new(skip.name()).help(skip.summary())).to_vec().into()
 }
 
 fn methods() -> PossibleValuesParser {

@@ -27,6 +27,11 @@ pub struct Setup<'a> {
 
 /// A method that holds a prepared scene.
 pub trait Method {
+    /// What was chosen for the scene before any of it is drawn, and why.
+    fn plan(&self) -> Vec<Choice> {
+        Vec::new()
+    }
+
     /// Renders one view. The scene's own is `scene.view`.
     ///
     /// # Errors
@@ -43,6 +48,17 @@ pub trait Method {
 
     /// Forgets what the last frame has left for one from the same eye, so that the next is timed whole.
     fn forget(&mut self);
+}
+
+/// One thing that a method has chosen.
+#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
+pub struct Choice {
+    /// What it is about.
+    pub about: &'static str,
+    /// What was chosen.
+    pub chosen: &'static str,
+    /// Why, a sentence without its full stop.
+    pub why: String,
 }
 
 /// A method that has no scene yet, with its device where it needs one.

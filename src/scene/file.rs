@@ -14,7 +14,7 @@ use toml::Spanned;
 use super::Background;
 use super::Model;
 use super::PIXEL_FOOTPRINT;
-use super::Traversal;
+use super::{Skip, Traversal};
 use super::camera::DEFAULT_FOV_DEGREES;
 use super::motion::{DeformSection, TransformSection};
 use super::shading::DEFAULT_SHADOW_SIZE;
@@ -303,6 +303,8 @@ pub struct MarchSection {
     pub samples: Samples,
     /// See [`Traversal`].
     pub traversal: Traversal,
+    /// What is not left out although it could be.
+    pub no_skip: Vec<Skip>,
 }
 
 /// `[shading]`: see [`Shading`](super::Shading) for what the numbers mean.
@@ -371,7 +373,7 @@ impl Default for ImageSection {
 
 impl Default for MarchSection {
     fn default() -> Self {
-        Self { plan: Plan::Default, step: Step(0.5), samples: Samples(10), traversal: Traversal::default() }
+        Self { plan: Plan::Default, step: Step(0.5), samples: Samples(10), traversal: Traversal::default(), no_skip: Vec::new() }
     }
 }
 

@@ -31,6 +31,7 @@ mod parts;
 mod sequence;
 pub mod shading;
 pub mod shadow;
+mod skip;
 pub mod solid;
 mod solids;
 mod source;
@@ -46,6 +47,7 @@ pub use load::{Loaded, load, load_if, parse};
 pub use sequence::{FrameInputs, Sequence};
 pub use shading::{Emission, Light, Model, Shading, Source};
 pub use shadow::LightView;
+pub use skip::{Skip, Skips};
 pub use solid::Solid;
 pub use timeline::{Ease, Timeline};
 
@@ -78,6 +80,8 @@ pub struct Scene {
     pub march: March,
     /// How it goes from tetrahedron to tetrahedron.
     pub traversal: Traversal,
+    /// What it may leave out.
+    pub skips: Skips,
 }
 
 /// What a scene asks of a device, known before its volume is computed.
@@ -202,6 +206,7 @@ impl Scene {
             view: View { camera, width: 512, height: 512, depth: false },
             march: March::default(),
             traversal: Traversal::default(),
+            skips: Skips::default(),
         }
     }
 

@@ -21,7 +21,8 @@ use super::source::{MeshSource, VolumeSource};
 use super::text::Text;
 use super::timeline::Moment;
 use super::{
-    Camera, March, Medium, Model, Scene, Sizes, Solid, View, backdrop, cameras, span, texel_edges, thickness,
+    Camera, March, Medium, Model, Scene, Sizes, Skips, Solid, View, backdrop, cameras, span, texel_edges,
+    thickness,
 };
 use crate::frame::{Backdrop, Stopwatch};
 use crate::mesh::Mesh;
@@ -393,6 +394,7 @@ impl Parts {
                 Plan::Exact => March::Exact,
             },
             traversal: file.march.traversal,
+            skips: Skips::without(&file.march.no_skip),
             shading: shading.transpose()?,
             solids,
             shell,

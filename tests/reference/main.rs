@@ -11,7 +11,7 @@ mod solids;
 use glam::{DVec2, DVec3};
 use mesoshell::mesh::generate::{Generator, Plane, Torus};
 use mesoshell::scene::{
-    Camera, Emission, Light, March, Medium, Model, Scene, Shading, Source, Traversal, View,
+    Camera, Emission, Light, March, Medium, Model, Scene, Shading, Skips, Source, Traversal, View,
 };
 use mesoshell::shell::{Shell, ShellOptions};
 use mesoshell::volume::{Directions, Pyramid, Volume};
@@ -85,6 +85,7 @@ fn scene(shell: Shell, volume: Pyramid, view: View) -> Scene {
         view,
         march: March::Default { step: 1.0 },
         traversal: Traversal::default(),
+        skips: Skips::default(),
     }
 }
 

@@ -7,7 +7,7 @@ use super::solids::SolidView;
 use super::walk::{self, RayBuffers, Ways};
 use super::{Shell, Sight};
 use crate::gpu::{Batch, Buffer, Keeps, Pipeline, PipelineInfo, Target, shaders};
-use crate::scene::{March, Model, View};
+use crate::scene::{Model, Skip, View};
 use crate::{Error, Result};
 
 /// The target of a picture and the pipeline that draws into it.
@@ -142,16 +142,19 @@ impl Shell {
         let switches = [
             ("DEPTH", view.depth),
             ("SOLIDS", self.solids.is_some()),
-            ("SPARSE", self.volume.is_sparse() && self.scene.march != March::Exact),
+            ("SPARSE", self.leaps()),
             ("LIT", self.lit.is_some()),
             ("SHADOWS", self.shadows().is_some()),
         ];
-        let mut constants = constants_of_volume(self.scene.march, seen.minified, &self.scene.volume).to_vec();
+        let skips = self.scene.skips;
+        let minified = seen.minified || !skips.allow(Skip::Levels);
+        let mut constants = constants_of_volume(self.scene.march, minified, &self.scene.volume).to_vec();
         let shading = self.scene.shading.as_ref();
         let fibre = shading.is_some_and(|shading| shading.model == Model::Fibre);
         let glow = shading.is_some_and(|shading| shading.emission.glow > 0.0);
         let inside = matches!(sight, Sight::Walked(crossings) if crossings.begun_inside > 0);
         constants.extend([fibre, glow, inside].map(u32::from));
+        constants.push(if skips.allow(Skip::Saturation) { walk::SATURATED.to_bits() } else { 0 });
         CanvasKind {
             width: view.width,
             height: view.height,

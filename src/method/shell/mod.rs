@@ -12,6 +12,7 @@ mod constants;
 mod left;
 pub mod lit;
 pub mod outline;
+mod plan;
 mod report;
 pub mod seen;
 pub mod shadows;
@@ -32,12 +33,12 @@ use self::shadows::Shadows;
 use self::solids::Solids;
 use self::volume::DeviceVolume;
 use self::walk::Ways;
-use super::{Method, Setup};
+use super::{Choice, Method, Setup};
 use crate::frame::{Frame, Image, Stopwatch};
 use crate::gpu::{Batch, Draw, Gpu, Sampled, draw};
 use crate::order::{Crossings, Sorted, Sorter};
 use crate::progress::{Interrupt, Progress};
-use crate::scene::{March, Scene, Sizes, Traversal, View, span};
+use crate::scene::{Scene, Sizes, Skip, View, span};
 use crate::shell::{self, Topology};
 use crate::{Error, Result};
 
@@ -151,14 +152,6 @@ fn sorter<'a>(kept: &'a mut Option<(Arc<Topology>, Sorter)>, shell: &shell::Shel
 }
 
 impl Shell {
-    /// Whether rays walk; else tetrahedra are sorted.
-    fn walks(&self) -> bool {
-        let march = self.scene.march;
-        self.scene.traversal == Traversal::Walk
-            && matches!(march, March::Default { .. })
-            && constants::wanted_samples(march, self.texels) <= walk::MOST_SAMPLES
-    }
-
     /// Where a light casts any.
     fn shadows(&self) -> Option<&Shadows> {
         self.shadows.iter().flatten().next()
@@ -166,10 +159,17 @@ impl Shell {
 }
 
 impl Method for Shell {
+    fn plan(&self) -> Vec<Choice> {
+        self.choices()
+    }
+
     fn render(&mut self, view: &View) -> Result<Frame> {
         let mut watch = Stopwatch::start();
         self.interrupt.check()?;
         let walks = self.walks();
+        if !self.scene.skips.allow(Skip::Kept) {
+            (self.last, self.shadows) = (None, None);
+        }
         let is_same_sight = |last: &Last| {
             last.view == *view
                 && Arc::ptr_eq(&last.vertices, &self.scene.shell.vertices)

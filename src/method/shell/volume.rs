@@ -6,16 +6,13 @@ use crate::Result;
 use crate::gpu::{Gpu, Sampled, Texture3d};
 use crate::volume::{Proximity, Pyramid};
 
-/// The part of the volume that must be empty for rays to look how far they may leap.
-const SPARSE: f64 = 0.1;
-
 /// The volume's texture, and what tells rays where in it nothing is.
 pub struct DeviceVolume {
     /// Of the volume itself.
     pub texture: Texture3d,
+    /// Where anything of it is empty.
     proximity: Option<Texture3d>,
-    /// The part, 0..1, of the full volume in which nothing is seen.
-    pub emptiness: f64,
+    emptiness: f64,
 }
 
 impl DeviceVolume {
@@ -28,12 +25,12 @@ impl DeviceVolume {
         let proximity = Proximity::new(volume);
         let emptiness = proximity.emptiness();
         let upload = || Texture3d::upload_proximity(gpu, "the volume's distances", &proximity);
-        Ok(Self { texture, proximity: (emptiness >= SPARSE).then(upload).transpose()?, emptiness })
+        Ok(Self { texture, proximity: (emptiness > 0.0).then(upload).transpose()?, emptiness })
     }
 
-    /// Whether there is enough of nothing in it for rays to leap.
-    pub fn is_sparse(&self) -> bool {
-        self.proximity.is_some()
+    /// The part, 0..1, of the full volume in which nothing is seen.
+    pub fn emptiness(&self) -> f64 {
+        self.emptiness
     }
 
     /// By the binding that shaders name.

@@ -15,6 +15,9 @@ const SIDE: u32 = 64;
 /// would be left to the host. Where there may be more, tetrahedra are sorted.
 pub const MOST_SAMPLES: f64 = 500.0;
 
+/// A ray ends where less is let through: that changes no picture by 1e-6.
+pub const SATURATED: f32 = 1.0 / (1 << 20) as f32;
+
 /// A shell's faces.
 pub struct Ways {
     topology: Arc<Topology>,

@@ -1,0 +1,86 @@
+//! Which way a scene is drawn, and what is left out: chosen from the scene alone.
+
+use super::Shell;
+use super::constants::wanted_samples;
+use super::walk::MOST_SAMPLES;
+use crate::method::Choice;
+use crate::scene::{March, Skip, Traversal};
+
+/// The part of the volume that must be empty for rays to look how far they may leap: to look costs a fetch for every sample that is
+/// taken, which a lit sample, that costs far more, repays earlier.
+const SPARSE: f64 = 0.5;
+const SPARSE_LIT: f64 = 0.1;
+
+impl Shell {
+    /// Whether rays walk; else tetrahedra are sorted.
+    pub(super) fn walks(&self) -> bool {
+        self.scene.traversal == Traversal::Walk
+            && matches!(self.scene.march, March::Default { .. })
+            && wanted_samples(self.scene.march, self.texels) <= MOST_SAMPLES
+    }
+
+    /// Whether rays leap over what is empty.
+    pub(super) fn leaps(&self) -> bool {
+        let enough = if self.lit.is_some() { SPARSE_LIT } else { SPARSE };
+        self.scene.skips.allow(Skip::EmptySpace)
+            && self.scene.march != March::Exact
+            && self.volume.emptiness() >= enough
+    }
+
+    /// See [`Method::plan`](crate::method::Method::plan).
+    pub(super) fn choices(&self) -> Vec<Choice> {
+        let allows = |skip: Skip| self.scene.skips.allow(skip);
+        let empty = format!("{:.0} % of the volume is empty", 100.0 * self.volume.emptiness());
+        let switched_off = || "it is switched off".to_owned();
+        let walk = if self.walks() {
+            ("walk", "each ray goes by itself from neighbour to neighbour: nothing need be sorted".to_owned())
+        } else if self.scene.traversal == Traversal::Sort {
+            ("sort", "march.traversal asks for it".to_owned())
+        } else if let March::Default { .. } = self.scene.march {
+            let wanted = wanted_samples(self.scene.march, self.texels);
+            ("sort", format!("a ray may take {wanted:.0} samples in one tetrahedron: too many to walk"))
+        } else {
+            ("sort", format!("the {} is drawn so", self.scene.march))
+        };
+        let on = |is_on: bool| if is_on { "on" } else { "off" };
+        let leap = if !allows(Skip::EmptySpace) {
+            switched_off()
+        } else if self.scene.march == March::Exact {
+            "the exact plan goes from texel to texel".to_owned()
+        } else {
+            empty + if self.leaps() { "" } else { ": too little to pay for looking" }
+        };
+        let saturation = if !self.walks() {
+            "all that is sorted is drawn"
+        } else if allows(Skip::Saturation) {
+            "rays end where 2^-20 of the light is let through"
+        } else {
+            "it is switched off"
+        };
+        let levels = if allows(Skip::Levels) { "asked of each view" } else { "it is switched off" };
+        let kept = if allows(Skip::Kept) { "compared with the frame before" } else { "it is switched off" };
+        let shading = self.scene.shading.as_ref();
+        let lights = shading.map_or(0, |shading| shading.lights.len());
+        let casting = shading.map_or(0, |shading| shading.lights.iter().filter(|light| light.shadow).count());
+        let choice = |about, chosen, why: String| Choice { about, chosen, why };
+        vec![
+            choice("traversal", walk.0, walk.1),
+            choice(Skip::EmptySpace.name(), on(self.leaps()), leap),
+            choice(Skip::Saturation.name(), on(self.walks() && allows(Skip::Saturation)), saturation.to_owned()),
+            choice(Skip::Levels.name(), on(allows(Skip::Levels)), levels.to_owned()),
+            choice(Skip::Kept.name(), on(allows(Skip::Kept)), kept.to_owned()),
+            choice("light", on(shading.is_some()), match shading {
+                None => "the scene is unlit: nothing of it is compiled in".to_owned(),
+                Some(_) => format!("{lights} lights"),
+            }),
+            choice("shadows", on(casting > 0), match casting {
+                0 => "no light casts any: nothing of them is compiled in".to_owned(),
+                _ => format!("{casting} of {lights} lights cast them"),
+            }),
+            choice("solids", on(!self.scene.solids.is_empty()), match self.scene.solids.len() {
+                0 => "there are none: nothing of them is compiled in".to_owned(),
+                count => format!("there are {count}"),
+            }),
+        ]
+    }
+}
