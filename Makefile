@@ -4,7 +4,7 @@
 CARGO ?= cargo
 TARGET := $(or $(CARGO_TARGET_DIR),target)
 
-.PHONY: demo test bench gallery recipe-pictures setup setup-test
+.PHONY: demo test bench bench-speed bench-gate gallery recipe-pictures setup setup-test
 
 demo: setup
 	$(CARGO) build --release
@@ -16,6 +16,17 @@ bench: setup
 	$(CARGO) build --release
 	$(TARGET)/release/mesoshell bench benches/default.toml --output out/bench
 	@echo "the report is in out/bench/report.html"
+
+# How much faster than the paper's plan its scenes are drawn with no more error.
+bench-speed: setup
+	$(CARGO) build --release
+	$(TARGET)/release/mesoshell bench --suite speed --output out/bench-speed
+	@echo "the report is in out/bench-speed/report.html"
+
+# Fails where such ratios have fallen by more than 15 % since benches/gate.json was committed.
+bench-gate: setup
+	$(CARGO) build --release
+	$(TARGET)/release/mesoshell bench --suite gate --baseline benches/gate.json --output out/bench-gate
 
 # The scenes of the 2005 paper first; none comes twice.
 gallery: setup

@@ -19,9 +19,11 @@ mod remaining;
 pub mod report;
 pub mod results;
 mod run;
+mod speedup;
 pub mod sweep;
 
 pub use environment::Environment;
 pub use results::{Point, Results, SceneResults};
 pub use run::{Options, Outcome, run};
+pub use speedup::Speedup;
 pub use sweep::{Levels, Setting, Sweep};

@@ -3,13 +3,14 @@
 mod antialiasing;
 
 use std::io::{IsTerminal, stderr};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use clap::Args;
 use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressStyle};
-use mesoshell::bench::{self, Levels, Options, Results, Sweep, sweep};
+use mesoshell::bench::{self, Levels, Options, Results, Speedup, Sweep, sweep};
 use mesoshell::gpu::DeviceChoice;
 use mesoshell::method::{METHODS, Setup};
 use mesoshell::progress::{Interrupt, Progress};
@@ -22,8 +23,14 @@ use super::{Talk, output};
 #[derive(Args)]
 pub struct Arguments {
     /// A sweep file (docs/bench.md lists its keys), or scene files
-    #[arg(default_value = "benches/default.toml", value_name = "SWEEP|SCENE")]
+    #[arg(default_value = "benches/default.toml", value_name = "SWEEP|SCENE", conflicts_with = "suite")]
     files: Vec<PathBuf>,
+    /// The sweep benches/NAME.toml: speed, gate
+    #[arg(long, value_name = "NAME")]
+    suite: Option<String>,
+    /// Fail, with exit code 1, where a speed-up over the paper's plan is more than 15 % below that in this results.json
+    #[arg(long, value_name = "FILE")]
+    baseline: Option<PathBuf>,
     /// Steps of the default plan, in texels, for scene files: by default 2,1,0.5,0.25,0.125
     #[arg(long, value_delimiter = ',', value_name = "LIST")]
     steps: Option<Vec<f64>>,
@@ -53,9 +60,21 @@ pub struct Arguments {
     device: Option<DeviceChoice>,
 }
 
+/// The part of a speed-up by which it may fall below the baseline's.
+const LOSS: f64 = 0.15;
+
+/// Exit code 1 where a speed-up is below the baseline's.
+///
 /// # Errors
 /// Whatever stands between a scene and its picture.
-pub fn run(arguments: Arguments, talk: Talk) -> Result<()> {
+pub fn run(mut arguments: Arguments, talk: Talk) -> Result<ExitCode> {
+    if let Some(name) = &arguments.suite {
+        arguments.files = vec![Path::new("benches").join(name).with_extension("toml")];
+    }
+    let baseline = arguments.baseline.as_deref().map(|file| {
+        Results::read(file).map_err(|error| error.with_help("--baseline takes the results.json of an earlier run"))
+    });
+    let baseline = baseline.transpose()?;
     let antialiasing = antialiasing::sweep(&arguments)?;
     let sweep = antialiasing.is_none().then(|| what(&arguments)).transpose()?;
     let interrupt = Interrupt::default();
@@ -70,7 +89,7 @@ pub fn run(arguments: Arguments, talk: Talk) -> Result<()> {
         let sweep = antialiasing.expect("one of the two was read");
         let outcome = bench::antialiasing::run(&sweep, &options, &setup);
         bar.bar.finish_and_clear();
-        return antialiasing::tell(&outcome?, talk);
+        return antialiasing::tell(&outcome?, talk).map(|()| ExitCode::SUCCESS);
     };
     let outcome = bench::run(&sweep, &options, &setup);
     bar.bar.finish_and_clear(); // The line is wiped before anything else is said.
@@ -86,7 +105,13 @@ pub fn run(arguments: Arguments, talk: Talk) -> Result<()> {
     for warning in &outcome.warnings {
         talk.warn(warning);
     }
-    talk.result(&outcome.results, || format!("{}\n\n{}", table(&outcome.results), outcome.report.display()))
+    let results = &outcome.results;
+    talk.result(results, || format!("{}\n\n{}{}", table(results), speedups(results), outcome.report.display()))?;
+    let slower = baseline.map(|baseline| results.slower_than(&baseline, LOSS)).unwrap_or_default();
+    for told in &slower {
+        talk.warn(&format!("slower than the baseline: {told}"));
+    }
+    Ok(if slower.is_empty() { ExitCode::SUCCESS } else { ExitCode::from(1) })
 }
 
 /// The sweep that the files and options ask for.
@@ -145,6 +170,31 @@ fn table(results: &Results) -> String {
         }
     }
     table.trim_end().to_owned()
+}
+
+/// A line for each point of the paper's plan, and the means over the scenes; nothing where that is not measured.
+fn speedups(results: &Results) -> String {
+    let mut table = String::new();
+    let mut counts = Vec::new();
+    for scene in &results.scenes {
+        for Speedup { samples, setting, ratio } in scene.speedups() {
+            let level = setting.map_or_else(|| "none is as accurate".to_owned(), |setting| setting.level());
+            let ratio = ratio.map_or_else(|| "-".to_owned(), |ratio| format!("{ratio:.1}"));
+            table += &format!("| {} | {samples} | {level} | {ratio} |\n", scene.name());
+            if !counts.contains(&samples) {
+                counts.push(samples);
+            }
+        }
+    }
+    for samples in counts {
+        if let Some(mean) = results.mean_speedup(samples) {
+            table += &format!("| geometric mean | {samples} | | {mean:.1} |\n");
+        }
+    }
+    if table.is_empty() {
+        return table;
+    }
+    format!("| scene | paper's samples | as accurate | times as fast |\n|---|---|---|---|\n{table}\n")
 }
 
 /// How much of the sweep is done, what is measured now, and how long the rest takes: one line that is drawn over on a

@@ -92,7 +92,7 @@ pub fn run() -> ExitCode {
         Command::Mesh(command) => mesh::run(command, talk).map(|()| ExitCode::SUCCESS),
         Command::Volume(command) => volume::run(command, talk).map(|()| ExitCode::SUCCESS),
         Command::Diff(arguments) => diff::run(arguments, talk),
-        Command::Bench(arguments) => bench::run(arguments, talk).map(|()| ExitCode::SUCCESS),
+        Command::Bench(arguments) => bench::run(arguments, talk),
         Command::Gallery(arguments) => gallery::run(arguments, talk),
         Command::Stress(arguments) => stress::run(arguments, talk),
         Command::AnimateCheck(arguments) => animate_check::run(arguments, talk),

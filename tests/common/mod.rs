@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use mesoshell::frame::Frame;
 use mesoshell::gpu::{DeviceChoice, Messages};
-use mesoshell::method::{self, Method, Setup};
+use mesoshell::method::{self, Choice, Method, Setup};
 use mesoshell::progress::{Interrupt, Progress, Silent};
 use mesoshell::scene::{Scene, View};
 use serde_json::Value;
@@ -30,6 +30,10 @@ impl Watched {
     pub fn update(&mut self, scene: &Arc<Scene>) {
         let method = self.method.as_mut().expect("present until dropped");
         method.update(scene.clone()).unwrap_or_else(|error| panic!("{error}"));
+    }
+
+    pub fn plan(&self) -> Vec<Choice> {
+        self.method.as_ref().expect("present until dropped").plan()
     }
 
     pub fn render(&mut self, view: &View) -> Frame {

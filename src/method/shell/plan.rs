@@ -23,7 +23,7 @@ impl Shell {
     pub(super) fn leaps(&self) -> bool {
         let enough = if self.lit.is_some() { SPARSE_LIT } else { SPARSE };
         self.scene.skips.allow(Skip::EmptySpace)
-            && self.scene.march != March::Exact
+            && matches!(self.scene.march, March::Default { .. })
             && self.volume.emptiness() >= enough
     }
 
@@ -45,8 +45,8 @@ impl Shell {
         let on = |is_on: bool| if is_on { "on" } else { "off" };
         let leap = if !allows(Skip::EmptySpace) {
             switched_off()
-        } else if self.scene.march == March::Exact {
-            "the exact plan goes from texel to texel".to_owned()
+        } else if !matches!(self.scene.march, March::Default { .. }) {
+            format!("the {} takes all its samples", self.scene.march)
         } else {
             empty + if self.leaps() { "" } else { ": too little to pay for looking" }
         };

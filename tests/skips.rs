@@ -1,0 +1,115 @@
+//! What is left out because a picture does not need it: the picture is the same without.
+
+mod common;
+
+use std::path::Path;
+use std::sync::Arc;
+
+use common::Watched;
+use mesoshell::frame::Frame;
+use mesoshell::method::Choice;
+use mesoshell::metric;
+use mesoshell::progress::Silent;
+use mesoshell::scene::{self, March, Scene, Skip, Skips, Traversal};
+
+fn load(name: &str, overrides: &[&str]) -> Scene {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(name).with_extension("toml");
+    let overrides = overrides.iter().map(|text| (*text).to_owned());
+    let overrides: Vec<String> = overrides.chain(["image.size=[96, 96]".to_owned()]).collect();
+    let mut scene = scene::load(&path, &overrides, &Silent).unwrap_or_else(|error| panic!("{error:?}")).scene;
+    scene.view.depth = true;
+    scene
+}
+
+/// With it, and with it switched off; and what was chosen about it.
+fn with_and_without(skip: Skip, scene: &Scene) -> [(Frame, Choice); 2] {
+    [Skips::default(), Skips::without(&[skip])].map(|skips| {
+        let scene = Arc::new(Scene { skips, ..scene.clone() });
+        let mut method = Watched::prepare("shell", &scene);
+        let choice = method.plan().into_iter().find(|choice| choice.about == skip.name()).unwrap();
+        (method.render(&scene.view), choice)
+    })
+}
+
+/// The largest difference of a channel, or of a depth where alpha is not next to nothing.
+fn difference([a, b]: [&Frame; 2]) -> f64 {
+    let of_depth = |((a, b), rgba): ((&f32, &f32), &[f32; 4])| {
+        if rgba[3] > 1e-3 { f64::from((a - b).abs()) } else { 0.0 }
+    };
+    let depths = a.depth.as_ref().unwrap().iter().zip(b.depth.as_ref().unwrap()).zip(&a.image.rgba);
+    depths.map(of_depth).fold(metric::compare(&a.image, &b.image).unwrap().max, f64::max)
+}
+
+#[test]
+fn leaps_change_nothing() {
+    let plans = [
+        (March::Default { step: 0.5 }, Traversal::Walk),
+        (March::Default { step: 0.3 }, Traversal::Sort),
+    ];
+    // From ever farther away: coarser levels are read, and several in one tetrahedron.
+    for eye in ["camera.fov=34", "camera.fov=120", "camera.eye=[0.2, 7, 16]"] {
+        let scene = load("lit-rocks", &[eye]);
+        for (march, traversal) in plans {
+            let scene = Scene { march, traversal, ..scene.clone() };
+            let [with, without] = with_and_without(Skip::EmptySpace, &scene);
+            assert_eq!((with.1.chosen, without.1.chosen), ("on", "off"), "{with:?}");
+            let covered = with.0.report.counts["pixels_covered"];
+            assert!(covered > 80, "{eye}: {covered}");
+            assert_eq!(difference([&with.0, &without.0]), 0.0, "{eye}, {march}, {traversal:?}");
+        }
+    }
+    let papers = Scene { march: March::Paper { samples: 10 }, ..load("lit-rocks", &[]) };
+    assert_eq!(with_and_without(Skip::EmptySpace, &papers)[0].1.chosen, "off", "the yardstick is the paper's");
+}
+
+#[test]
+fn a_volume_that_is_hardly_empty_is_not_looked_through() {
+    let [with, _] = with_and_without(Skip::EmptySpace, &load("fur-sphere", &[]));
+    assert_eq!(with.1.chosen, "off");
+    assert!(with.1.why.contains("too little"), "{}", with.1.why);
+}
+
+#[test]
+fn what_is_behind_the_opaque_does_not_count() {
+    let [with, without] = with_and_without(Skip::Saturation, &load("lit-rocks", &[]));
+    assert_eq!((with.1.chosen, without.1.chosen), ("on", "off"));
+    // 2^-20 of a light of at most 2, and of a depth below 10.
+    let difference = difference([&with.0, &without.0]);
+    assert!(difference <= 1e-5, "{difference}");
+    assert!(metric::compare(&with.0.image, &without.0.image).unwrap().max <= 2e-6);
+}
+
+#[test]
+fn levels_that_nothing_reads_do_not_count() {
+    let near = ["camera.fov=3"];
+    let [with, without] = with_and_without(Skip::Levels, &load("fur-sphere", &near));
+    let told = "all is magnified: no level of detail but 0 is compiled in";
+    assert!(with.0.report.skipped.iter().any(|skipped| skipped == told), "{:?}", with.0.report.skipped);
+    assert_eq!(difference([&with.0, &without.0]), 0.0);
+}
+
+#[test]
+fn what_is_kept_is_what_would_be_made_again() {
+    let scene = Arc::new(load("effects/shadow", &["shading.shadow_size=64"]));
+    let frames = [Skips::default(), Skips::without(&[Skip::Kept])].map(|skips| {
+        let scene = Arc::new(Scene { skips, ..(*scene).clone() });
+        let mut method = Watched::prepare("shell", &scene);
+        method.render(&scene.view);
+        method.render(&scene.view)
+    });
+    let stages = |frame: &Frame| -> Vec<String> { frame.report.stages.iter().map(|stage| stage.name.clone()).collect() };
+    for stage in ["order", "see", "shadows"] {
+        assert!(!stages(&frames[0]).contains(&stage.to_owned()), "{stage} is kept");
+        assert!(stages(&frames[1]).contains(&stage.to_owned()), "{stage} is made again");
+    }
+    assert_eq!(difference([&frames[0], &frames[1]]), 0.0);
+}
+
+#[test]
+fn another_picture_is_found_out() {
+    let frames = [&[][..], &["shell.thickness=0.301"]].map(|overrides| {
+        let scene = Arc::new(load("lit-rocks", overrides));
+        Watched::prepare("shell", &scene).render(&scene.view)
+    });
+    assert!(difference([&frames[0], &frames[1]]) > 1e-4);
+}
