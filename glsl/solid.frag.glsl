@@ -42,9 +42,9 @@ void main() {
     vec3 normal = normalize(vec3(along(triangle.normal[0], point), along(triangle.normal[1], point), along(triangle.normal[2], point)));
     vec3 scattered = lighting.ambient;
     vec3 mirrored = vec3(0.0);
-    for (uint i = 0; i < lighting.count; i++) {
+    for (uint i = 0; i < LIGHTS; i++) {
         vec3 to_light;
-        vec3 light = arriving(lighting.sources[i], at, triangle.facing.w * facing, to_light);
+        vec3 light = arriving(i, at, triangle.facing.w * facing, to_light);
         if (!(dot(facing, to_light) > 0.0)) continue;
         vec3 half_way = normalize(to_light + to_eye);
         float aligned = max(dot(normal, to_light), 0.0);

@@ -1,31 +1,51 @@
 // The lights of a scene, and what of them reaches a point. Points are in world space with the origin at the eye, in parts of
 // `Seen::unit`.
 
+// How many; which cast shadows, a bit each; and how many pictures each of those has. Known to the compiler, so that where a loop over
+// lights is unrolled, what is read of them is at places that it knows: lavapipe reads that once for all pixels.
+layout(constant_id = 7) const uint LIGHTS = 0;
+layout(constant_id = 8) const uint CASTING_LOW = 0;
+layout(constant_id = 9) const uint CASTING_HIGH = 0; // from the 33rd light on
+layout(constant_id = 10) const uint PICTURES = 1;
+
+const uint MOST_LIGHTS = 64;
+const uint MOST_PICTURES = 160;
+
 struct LightSource {
     vec4 place;  // towards it, or where it is; 1 / falloff, 0 where there is none
     vec4 colour; // the fourth: 0 directional, 1 a point
-    uvec2 pictures; // range of its pictures: first, end; empty where it casts no shadow
 };
 
-layout(set = 0, binding = 5, std430) readonly buffer Lighting {
+layout(set = 0, binding = 5, std140) uniform Lighting {
     vec4 world_from_view[3]; // columns
     vec3 ambient;
     float diffuse;
     float specular;
     float shininess;
-    uint count;
     float glow;
     float glow_from;
-    LightSource sources[];
+    LightSource sources[MOST_LIGHTS];
 } lighting;
 
 #ifdef SHADOWS
 #include "shadows.glsl"
+
+bool casts_shadows(uint light) {
+    return (((light < 32 ? CASTING_LOW : CASTING_HIGH) >> (light & 31)) & 1) != 0;
+}
+
+// In `light_pictures`.
+uint first_picture(uint light) {
+    uint before = (1u << (light & 31)) - 1;
+    uint casting = light < 32 ? bitCount(CASTING_LOW & before) : bitCount(CASTING_LOW) + bitCount(CASTING_HIGH & before);
+    return casting * PICTURES;
+}
 #endif
 
 // The light that reaches a point, and the unit vector towards it. Its shadow is that of a point `off` it, which is off a surface
 // that would else cast a shadow on itself.
-vec3 arriving(LightSource light, vec3 point, vec3 off, out vec3 to_light) {
+vec3 arriving(uint index, vec3 point, vec3 off, out vec3 to_light) {
+    LightSource light = lighting.sources[index];
     vec3 colour = light.colour.rgb;
     if (light.colour.w == 0.0) {
         to_light = light.place.xyz;
@@ -37,7 +57,7 @@ vec3 arriving(LightSource light, vec3 point, vec3 off, out vec3 to_light) {
         colour /= 1.0 + falls * falls;
     }
 #ifdef SHADOWS
-    colour *= let_through(light.pictures, point + off);
+    if (casts_shadows(index)) colour *= let_through(first_picture(index), point + off);
 #endif
     return colour;
 }

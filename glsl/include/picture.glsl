@@ -10,4 +10,9 @@ struct LightPicture {
     float opacity_distances; // in the light's unit
 };
 
+#ifdef LIT
+// Of the lights that cast shadows, PICTURES each.
+layout(set = 0, binding = 6, std140) uniform LightPictures { LightPicture light_pictures[MOST_PICTURES]; };
+#else
 layout(set = 0, binding = 6, std430) readonly buffer LightPictures { LightPicture light_pictures[]; };
+#endif

@@ -19,6 +19,38 @@ vec4 fetch_direction(Path path, float depth) {
                level - fine);
 }
 
+// A point, as light meets it.
+struct Spot {
+    vec3 at;        // in world space around the eye
+    vec3 to_eye;
+    vec3 direction; // of the texture, unit length; 0 where it has none
+    float agreement;
+};
+
+// Adds what it scatters and mirrors of a light.
+void add_light(uint light_index, Spot spot, inout vec3 scattered, inout vec3 mirrored) {
+    vec3 to_light;
+    vec3 light = arriving(light_index, spot.at, vec3(0.0), to_light);
+    float along = dot(spot.direction, to_light);
+    float aligned;
+    float lobe;
+    if (FIBRE) {
+        float along_eye = dot(spot.direction, spot.to_eye);
+        aligned = sqrt(max(1.0 - along * along, 0.0));
+        float off_cone = aligned * sqrt(max(1.0 - along_eye * along_eye, 0.0)) - along * along_eye;
+        lobe = pow(max(off_cone, 0.0), lighting.shininess);
+    } else {
+        vec3 half_way = to_light + spot.to_eye;
+        float half_size = length(half_way);
+        float highlight = half_size > 0.0 ? dot(spot.direction, half_way) / half_size : 0.0;
+        aligned = max(along, 0.0);
+        lobe = aligned * pow(max(highlight, 0.0), lighting.shininess);
+    }
+    float mean = FIBRE ? 0.78539816339744831 : 0.25; // pi / 4: see src/scene/shading.rs
+    scattered += light * (lighting.diffuse * mix(mean, aligned, spot.agreement));
+    mirrored += light * (lighting.specular * spot.agreement * lobe);
+}
+
 // The texel as it is lit: its alpha, and the colour that it sends to the eye, premultiplied as before.
 vec4 radiant(Path path, float depth) {
     vec4 texel = fetch(path, depth);
@@ -32,31 +64,15 @@ vec4 radiant(Path path, float depth) {
 
     vec3 ray = lighting.world_from_view[0].xyz * view_ray.x + lighting.world_from_view[1].xyz * view_ray.y
         + lighting.world_from_view[2].xyz * view_ray.z;
-    vec3 to_eye = -normalize(ray);
+    Spot spot = Spot(depth * ray, -normalize(ray), direction, agreement);
     vec3 scattered = lighting.ambient;
     vec3 mirrored = vec3(0.0);
-    for (uint i = 0; i < lighting.count; i++) {
-        vec3 to_light;
-        vec3 light = arriving(lighting.sources[i], depth * ray, vec3(0.0), to_light);
-        float along = dot(direction, to_light);
-        float aligned;
-        float lobe;
-        if (FIBRE) {
-            float along_eye = dot(direction, to_eye);
-            aligned = sqrt(max(1.0 - along * along, 0.0));
-            float off_cone = aligned * sqrt(max(1.0 - along_eye * along_eye, 0.0)) - along * along_eye;
-            lobe = pow(max(off_cone, 0.0), lighting.shininess);
-        } else {
-            vec3 half_way = to_light + to_eye;
-            float half_size = length(half_way);
-            float highlight = half_size > 0.0 ? dot(direction, half_way) / half_size : 0.0;
-            aligned = max(along, 0.0);
-            lobe = aligned * pow(max(highlight, 0.0), lighting.shininess);
-        }
-        float mean = FIBRE ? 0.78539816339744831 : 0.25; // pi / 4: see src/scene/shading.rs
-        scattered += light * (lighting.diffuse * mix(mean, aligned, agreement));
-        mirrored += light * (lighting.specular * agreement * lobe);
-    }
+    // Unrolled by hand: few scenes have more.
+    if (LIGHTS > 0) add_light(0, spot, scattered, mirrored);
+    if (LIGHTS > 1) add_light(1, spot, scattered, mirrored);
+    if (LIGHTS > 2) add_light(2, spot, scattered, mirrored);
+    if (LIGHTS > 3) add_light(3, spot, scattered, mirrored);
+    for (uint i = 4; i < LIGHTS; i++) add_light(i, spot, scattered, mirrored);
     if (GLOW) {
         float brightest = max(texel.r, max(texel.g, texel.b)) / texel.a;
         scattered += lighting.glow * clamp((brightest - lighting.glow_from) / (1.0 - lighting.glow_from), 0.0, 1.0);

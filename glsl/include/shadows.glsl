@@ -33,34 +33,42 @@ float transmittance_until(ivec2 pixel, float depth) {
     return 1.0 - min(done * a.x, a.y);
 }
 
-float let_through(uvec2 pictures, vec3 point) {
-    for (uint i = pictures.x; i < pictures.y; i++) {
-        LightPicture light = light_pictures[i];
+// Of a light whose pictures begin at `first`.
+float let_through(uint first, vec3 point) {
+    // Where the point is in the picture that it is in, if in any.
+    vec3 place = vec3(0.0);
+    vec2 corner = vec2(0.0);
+    bool is_parallel = false;
+    bool is_seen = false;
+    for (uint i = 0; i < PICTURES; i++) {
+        LightPicture light = light_pictures[first + i];
         vec4 at = vec4(point, 1.0);
-        vec3 place = vec3(dot(light.from_world[0], at), dot(light.from_world[1], at), dot(light.from_world[2], at));
-        bool is_parallel = light.is_parallel != 0;
-        if (!is_parallel) {
-            if (!(place.z > 0.0)) continue;
-            place.xy /= place.z;
+        vec3 there = vec3(dot(light.from_world[0], at), dot(light.from_world[1], at), dot(light.from_world[2], at));
+        bool parallel = light.is_parallel != 0;
+        there.xy /= parallel ? 1.0 : there.z;
+        there.y = -there.y;
+        bool is_before = parallel || there.z > 0.0;
+        // Four pixels of it are read.
+        if (!is_seen && is_before && max(abs(there.x), abs(there.y)) <= light.half_side - 1.0) {
+            place = there;
+            corner = light.middle + there.xy - 0.5;
+            is_parallel = parallel;
+            is_seen = true;
         }
-        place.y = -place.y;
-        if (!(max(abs(place.x), abs(place.y)) <= light.half_side - 1.0)) continue; // four pixels of it are read
-        vec2 corner = light.middle + place.xy - 0.5;
-        vec2 low = floor(corner);
-        vec2 part = corner - low;
-        float sum = 0.0;
-        for (int j = 0; j < 4; j++) {
-            ivec2 offset = ivec2(j & 1, j >> 1);
-            vec2 weights = mix(1.0 - part, part, vec2(offset));
-            ivec2 pixel = ivec2(low) + offset;
-            float through = transmittance_until(pixel, place.z);
-#ifdef SOLIDS
-            vec4 blocker = texelFetch(blockers, pixel, 0);
-            if (blocker.w > 0.0 && place.z > blocker_depth(blocker.xyz, place.xy, is_parallel)) through = 0.0;
-#endif
-            sum += weights.x * weights.y * through;
-        }
-        return sum;
     }
-    return 1.0; // beside all that could stand in the way
+    vec2 low = floor(corner);
+    vec2 part = corner - low;
+    float sum = 0.0;
+    for (int j = 0; j < 4; j++) {
+        ivec2 offset = ivec2(j & 1, j >> 1);
+        vec2 weights = mix(1.0 - part, part, vec2(offset));
+        ivec2 pixel = ivec2(low) + offset;
+        float through = transmittance_until(pixel, place.z);
+#ifdef SOLIDS
+        vec4 blocker = texelFetch(blockers, pixel, 0);
+        if (blocker.w > 0.0 && place.z > blocker_depth(blocker.xyz, place.xy, is_parallel)) through = 0.0;
+#endif
+        sum += weights.x * weights.y * through;
+    }
+    return is_seen ? sum : 1.0; // beside all that could stand in the way
 }

@@ -17,6 +17,7 @@ enum Kind {
     /// Not at all.
     Transfer(vk::BufferUsageFlags),
     Storage,
+    Uniform,
     /// As a row of texels, which is read by `texelFetch`: where neighbouring fragments read here and there, that is faster on some
     /// devices than a storage buffer.
     Texels(vk::Format),
@@ -44,6 +45,14 @@ impl Buffer {
         Self::filled(gpu, name, Kind::Storage, bytemuck::cast_slice(data))
     }
 
+    /// A uniform buffer, of the size that shaders declare: of few bytes that all fragments read alike.
+    ///
+    /// # Errors
+    /// As [`Buffer::storage`].
+    pub fn uniform<T: bytemuck::NoUninit>(gpu: &Arc<Gpu>, name: &'static str, data: &[T]) -> Result<Self> {
+        Self::filled(gpu, name, Kind::Uniform, bytemuck::cast_slice(data))
+    }
+
     /// Texels of four floats that shaders fetch, as many as `data` has; `T` is made of such.
     ///
     /// # Errors
@@ -68,6 +77,7 @@ impl Buffer {
                 let texel = if format == vk::Format::R32_UINT { 4 } else { 16 };
                 (data.len().max(texel), u64::from(gpu.limits.max_texel_buffer_elements) * texel as u64)
             }
+            Kind::Uniform => (data.len().max(4), u64::from(gpu.limits.max_uniform_buffer_range)),
             _ => (data.len().max(4), u64::from(gpu.limits.max_storage_buffer_range)),
         };
         if bytes as u64 > limit {
@@ -113,6 +123,7 @@ impl Buffer {
         let usage = match kind {
             Kind::Transfer(usage) => usage,
             Kind::Storage => vk::BufferUsageFlags::STORAGE_BUFFER,
+            Kind::Uniform => vk::BufferUsageFlags::UNIFORM_BUFFER,
             Kind::Texels(_) => vk::BufferUsageFlags::UNIFORM_TEXEL_BUFFER,
         };
         gpu.check_memory(name, bytes)?;

@@ -37,6 +37,8 @@ pub struct PipelineInfo<'a> {
     pub constants: &'a [u32],
     /// Bindings in set 0 of the storage buffers that either shader reads.
     pub storage_buffers: &'a [u32],
+    /// Bindings in set 0 of the uniform buffers that the fragment shader reads.
+    pub uniform_buffers: &'a [u32],
     /// Bindings in set 0 of the buffers of texels that the fragment shader reads.
     pub texel_buffers: &'a [u32],
     /// Bindings in set 0 of the textures that the fragment shader reads.
@@ -56,6 +58,7 @@ pub struct Pipeline {
     pool: vk::DescriptorPool,
     pub(super) set: vk::DescriptorSet,
     buffers: Vec<u32>,
+    uniform_buffers: Vec<u32>,
     texel_buffers: Vec<u32>,
     textures: Vec<u32>,
     push_constant_bytes: u32,
@@ -90,6 +93,7 @@ impl Pipeline {
             pool: vk::DescriptorPool::null(),
             set: vk::DescriptorSet::null(),
             buffers: info.storage_buffers.to_vec(),
+            uniform_buffers: info.uniform_buffers.to_vec(),
             texel_buffers: info.texel_buffers.to_vec(),
             textures: info.textures.to_vec(),
             push_constant_bytes: info.push_constant_bytes,
@@ -182,6 +186,7 @@ impl Pipeline {
                 vk::DescriptorType::STORAGE_BUFFER,
                 vk::ShaderStageFlags::VERTEX | vk::ShaderStageFlags::FRAGMENT,
             ),
+            (&self.uniform_buffers, vk::DescriptorType::UNIFORM_BUFFER, vk::ShaderStageFlags::FRAGMENT),
             (&self.texel_buffers, vk::DescriptorType::UNIFORM_TEXEL_BUFFER, vk::ShaderStageFlags::FRAGMENT),
             (&self.textures, vk::DescriptorType::COMBINED_IMAGE_SAMPLER, vk::ShaderStageFlags::FRAGMENT),
         ];
@@ -251,10 +256,11 @@ impl Pipeline {
                 buffers.iter().find(|(one, _)| one == binding).expect("a buffer for each binding");
             buffer
         };
-        let buffer_infos = self.buffers.iter().map(|binding| {
+        let whole = |binding: &u32| {
             [vk::DescriptorBufferInfo { buffer: buffer(binding).raw, offset: 0, range: vk::WHOLE_SIZE }]
-        });
-        let buffer_infos: Vec<_> = buffer_infos.collect();
+        };
+        let storage_infos: Vec<_> = self.buffers.iter().map(whole).collect();
+        let uniform_infos: Vec<_> = self.uniform_buffers.iter().map(whole).collect();
         let views: Vec<_> = self.texel_buffers.iter().map(|binding| [buffer(binding).view]).collect();
         let image_infos = self.textures.iter().map(|&binding| {
             let (_, texture) =
@@ -269,8 +275,11 @@ impl Pipeline {
         let image_infos: Vec<_> = image_infos.collect();
         let write = |&binding: &u32| vk::WriteDescriptorSet::default().dst_set(self.set).dst_binding(binding);
         let mut writes = Vec::new();
-        for (binding, info) in self.buffers.iter().zip(&buffer_infos) {
+        for (binding, info) in self.buffers.iter().zip(&storage_infos) {
             writes.push(write(binding).descriptor_type(vk::DescriptorType::STORAGE_BUFFER).buffer_info(info));
+        }
+        for (binding, info) in self.uniform_buffers.iter().zip(&uniform_infos) {
+            writes.push(write(binding).descriptor_type(vk::DescriptorType::UNIFORM_BUFFER).buffer_info(info));
         }
         for (binding, view) in self.texel_buffers.iter().zip(&views) {
             let of_texels = write(binding).descriptor_type(vk::DescriptorType::UNIFORM_TEXEL_BUFFER);

@@ -1,7 +1,7 @@
 //! What a frame of one size and kind needs on the device beside the scene: its target, pipelines and the buffers of what is seen.
 
 use super::constants::{ViewConstants, constants_of_volume};
-use super::lit::{Lit, LitView, Sight as LitSight};
+use super::lit::{self, Lit, LitView, Sight as LitSight};
 use super::seen::{Run, Seen};
 use super::solids::SolidView;
 use super::walk::{self, RayBuffers, Ways};
@@ -155,6 +155,8 @@ impl Shell {
         let inside = matches!(sight, Sight::Walked(crossings) if crossings.begun_inside > 0);
         constants.extend([fibre, glow, inside].map(u32::from));
         constants.push(if skips.allow(Skip::Saturation) { walk::SATURATED.to_bits() } else { 0 });
+        let lights = self.scene.shading.iter().flat_map(|shading| &shading.lights);
+        constants.extend(lit::constants(lights, self.shadows()));
         CanvasKind {
             width: view.width,
             height: view.height,
@@ -172,18 +174,19 @@ impl Shell {
     fn new_canvas(&self, kind: CanvasKind, sight: &Sight, seen: &Seen, view: &View) -> Result<Canvas> {
         let target = Target::new(&self.gpu, kind.width, kind.height, if kind.depth { 2 } else { 1 })?;
         let on = &kind.switches;
-        let mut buffers = if kind.walks { Vec::new() } else { vec![0, 1, 2] };
+        let mut uniform_buffers = Vec::new();
+        let buffers = if kind.walks { Vec::new() } else { vec![0, 1, 2] };
         let mut texel_buffers = if kind.walks { vec![18, 19, 20, 21] } else { Vec::new() };
         let mut textures = vec![8];
         for &switch in on {
-            let (more_buffers, more_texel_buffers, more_textures): (&[u32], &[u32], &[u32]) = match switch {
+            let (more_uniform_buffers, more_texel_buffers, more_textures): (&[u32], &[u32], &[u32]) = match switch {
                 "LIT" => (&[5], &[3, 4], &[9]),
                 "SHADOWS" => (&[6], &[], &[10, 11, 12, 13]),
                 "SOLIDS" => (&[], &[], &[15]),
                 "SPARSE" => (&[], &[], &[22]),
                 _ => (&[], &[], &[]),
             };
-            buffers.extend(more_buffers);
+            uniform_buffers.extend(more_uniform_buffers);
             texel_buffers.extend(more_texel_buffers);
             textures.extend(more_textures);
         }
@@ -195,6 +198,7 @@ impl Shell {
             fragment: shaders::SHELL_FRAG.with(on),
             constants: &kind.constants,
             storage_buffers: &buffers,
+            uniform_buffers: &uniform_buffers,
             texel_buffers: &texel_buffers,
             textures: &textures,
             push_constant_bytes: size_of::<ViewConstants>() as u32,
@@ -237,11 +241,12 @@ impl Shell {
                 fragment: shaders::LAYER_FRAG.with(on),
                 constants: &[],
                 storage_buffers: &[],
+                uniform_buffers: &[],
                 texel_buffers: &[],
                 textures: &[15, 16],
                 ..info
             };
-            Ok::<_, Error>((SolidView::new(&self.gpu, view, on)?, Pipeline::new(&self.gpu, &target, &layer)?))
+            Ok::<_, Error>((SolidView::new(&self.gpu, view, on, &kind.constants)?, Pipeline::new(&self.gpu, &target, &layer)?))
         });
         let lit = match (&self.lit, self.lit_sight(seen, view)) {
             (Some(lit), Some(sight)) => Some(LitView::new(&self.gpu, lit, sight)?),

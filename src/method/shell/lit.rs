@@ -10,6 +10,7 @@ use super::seen::Seen;
 use super::shadows::{LightPicture, Shadows};
 use crate::Result;
 use crate::gpu::{Buffer, Gpu, Texture3d};
+use crate::scene::shading::MOST_LIGHTS;
 use crate::scene::{Light, Shading, Source, View};
 use crate::shell::{self, Shell};
 
@@ -30,7 +31,7 @@ pub struct LitCell {
     pub per_height: [f32; 4],
 }
 
-/// `Lighting` of `glsl/include/lights.glsl`, before its sources: see there for each member.
+/// `Lighting` of `glsl/include/lights.glsl`, before its [`MOST_LIGHTS`] sources: see there for each member.
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
 #[allow(missing_docs, reason = "documented at the one declaration in glsl")]
@@ -40,10 +41,8 @@ pub struct Lighting {
     pub diffuse: f32,
     pub specular: f32,
     pub shininess: f32,
-    pub count: u32,
     pub glow: f32,
     pub glow_from: f32,
-    pub padding: [u32; 3],
 }
 
 /// `LightSource` of `glsl/include/lights.glsl`: see there for each member.
@@ -53,8 +52,19 @@ pub struct Lighting {
 pub struct LightSource {
     pub place: [f32; 4],
     pub colour: [f32; 4],
-    pub pictures: [u32; 2],
-    pub padding: [u32; 2],
+}
+
+/// Specialisation constants 7 to 10 of lit shaders, in `glsl/include/lights.glsl`: how many lights, which of them cast shadows, and from
+/// how many pictures.
+pub fn constants<'a>(lights: impl Iterator<Item = &'a Light>, shadows: Option<&Shadows>) -> [u32; 4] {
+    let mut count = 0;
+    let mut casting = 0u64;
+    for light in lights {
+        casting |= u64::from(light.shadow) << count;
+        count += 1;
+    }
+    let pictures = shadows.map_or(1, Shadows::pictures_a_light);
+    [count, casting as u32, (casting >> 32) as u32, pictures as u32]
 }
 
 /// What does not depend on the view.
@@ -141,10 +151,10 @@ impl LitView {
     /// As [`Lit::new`].
     pub fn new(gpu: &Arc<Gpu>, lit: &Lit, sight: Sight<'_>) -> Result<Self> {
         let pictures = sight.pictures();
-        let pictures = pictures.map(|pictures| Buffer::storage(gpu, "the lights' pictures", &pictures));
+        let pictures = pictures.map(|pictures| Buffer::uniform(gpu, "the lights' pictures", &pictures));
         Ok(Self {
             cells: Buffer::floats(gpu, "the tetrahedra's frames", &lit.cells(sight.shell, sight.seen))?,
-            lighting: Buffer::storage(gpu, "the lights", &sight.lighting())?,
+            lighting: Buffer::uniform(gpu, "the lights", &sight.lighting())?,
             pictures: pictures.transpose()?,
         })
     }
@@ -185,12 +195,10 @@ impl Sight<'_> {
             diffuse: shading.diffuse as f32,
             specular: shading.specular as f32,
             shininess: shading.shininess as f32,
-            count: shading.lights.len() as u32,
             glow: shading.emission.glow as f32,
             glow_from: shading.emission.from as f32,
-            padding: [0; 3],
         };
-        let source = |(index, light): (usize, &Light)| {
+        let source = |light: &Light| {
             let colour = light.colour.as_vec3();
             let (place, kind) = match light.source {
                 Source::Directional { towards } => (towards.as_vec3().extend(0.0), 0.0),
@@ -203,11 +211,10 @@ impl Sight<'_> {
             LightSource {
                 place: place.into(),
                 colour: colour.extend(kind).into(),
-                pictures: self.shadows.map_or([0; 2], |shadows| shadows.pictures_of(index)),
-                padding: [0; 2],
             }
         };
-        let sources: Vec<LightSource> = shading.lights.iter().enumerate().map(source).collect();
+        let mut sources: Vec<LightSource> = shading.lights.iter().map(source).collect();
+        sources.resize(MOST_LIGHTS, LightSource::zeroed());
         [bytemuck::bytes_of(&lighting), bytemuck::cast_slice(&sources)].concat()
     }
 }

@@ -5,6 +5,7 @@
 //! Dufort, Leblanc, Poulin 2005, section 5.3, read an opaque shadow map at every sample, and give transmittance up as too costly.
 //! Here the map holds transmittance as a function of depth (Lokovic, Veach 2000), which one pass over the shell makes.
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use bytemuck::{Pod, Zeroable};
@@ -13,13 +14,13 @@ use rayon::prelude::*;
 
 use super::constants::{ViewConstants, constants_of_volume};
 use super::seen::{Cell, Tile};
-use crate::Result;
 use crate::gpu::{
     Batch, Buffer, Draw, Gpu, Keeps, Pipeline, PipelineInfo, Sampled, Target, Texture3d, draw, shaders,
 };
 use crate::progress::{Interrupt, Progress};
 use crate::scene::{LightView, March, Scene};
 use crate::shell::Shell;
+use crate::{Error, Result};
 
 /// `LightPicture` of `glsl/include/picture.glsl`: see there for each member.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Pod, Zeroable)]
@@ -46,6 +47,9 @@ pub struct Blocker {
     pub padding: [u32; 3],
 }
 
+/// `MOST_PICTURES` of `glsl/include/lights.glsl`: with them a uniform buffer is as large as any device takes.
+const MOST_PICTURES: usize = 160;
+
 /// `CURVE_IMAGES` of `glsl/include/curve.glsl`.
 const CURVE_IMAGES: usize = 4;
 
@@ -66,8 +70,8 @@ const COARSEST_STEP: f64 = 0.5;
 /// What all lights see.
 pub struct Shadows {
     views: Vec<LightView>,
-    /// By light; empty where it casts no shadow.
-    ranges: Vec<[u32; 2]>,
+    /// Of the views, by light that casts shadows.
+    ranges: Vec<Range<usize>>,
     /// Pixels a side of a picture.
     side: u32,
     /// Pictures in a row of the image.
@@ -106,12 +110,17 @@ impl Shadows {
         let (centre, radius) = scene.bounds();
         let mut views = Vec::new();
         let mut ranges = Vec::new();
-        for light in &shading.lights {
-            let first = views.len() as u32;
-            if light.shadow {
-                views.extend(LightView::of(light, centre, radius, shading.shadow_size));
-            }
-            ranges.push([first, views.len() as u32]);
+        for light in shading.lights.iter().filter(|light| light.shadow) {
+            let first = views.len();
+            views.extend(LightView::of(light, centre, radius, shading.shadow_size));
+            ranges.push(first..views.len());
+        }
+        let most = ranges.iter().map(Range::len).max().unwrap_or(0);
+        if ranges.len() * most > MOST_PICTURES {
+            return Err(Error::Usage {
+                message: format!("{} lights cast shadows, from {most} pictures each: too many", ranges.len()),
+                help: Some(format!("let fewer cast them: there may be {MOST_PICTURES} pictures")),
+            });
         }
         progress.stage("drawing shadows");
         let side = shading.shadow_size;
@@ -140,14 +149,14 @@ impl Shadows {
         Ok(Some(shadows))
     }
 
-    /// The pictures of a light.
-    pub fn pictures_of(&self, light: usize) -> [u32; 2] {
-        self.ranges[light]
-    }
-
-    /// How many there are.
+    /// How many pictures there are.
     pub fn pictures(&self) -> usize {
         self.views.len()
+    }
+
+    /// The most that one light has.
+    pub fn pictures_a_light(&self) -> usize {
+        self.ranges.iter().map(Range::len).max().unwrap_or(0)
     }
 
     /// The longest way, in world units, from one pixel of a picture to the next.
@@ -164,7 +173,8 @@ impl Shadows {
         curves.chain(blockers).collect()
     }
 
-    /// The pictures, for points in world space around `eye` in parts of `unit`.
+    /// The pictures, for points in world space around `eye` in parts of `unit`: as many of each light, the last of which may hold
+    /// nothing; and as many as shaders declare.
     pub fn seen_from(&self, eye: DVec3, unit: f64) -> Vec<LightPicture> {
         let picture = |(index, view): (usize, &LightView)| {
             let way = eye - view.origin;
@@ -183,7 +193,15 @@ impl Shadows {
                 ..self.picture(index)
             }
         };
-        self.views.iter().enumerate().map(picture).collect()
+        let nothing = LightPicture { half_side: -1.0, ..LightPicture::default() };
+        let most = self.pictures_a_light();
+        let mut pictures = Vec::new();
+        for range in &self.ranges {
+            pictures.extend(range.clone().map(|index| picture((index, &self.views[index]))));
+            pictures.resize(pictures.len().next_multiple_of(most), nothing);
+        }
+        pictures.resize(MOST_PICTURES, nothing);
+        pictures
     }
 
     /// Of no eye.
@@ -232,6 +250,7 @@ impl Shadows {
             fragment: shaders::SHADOW_FRAG.with(&[]),
             constants: &constants_of_volume(March::default(), drawn.minified, &scene.volume),
             storage_buffers: &[0, 1, 2, 6],
+            uniform_buffers: &[],
             texel_buffers: &[],
             textures: &[8],
             push_constant_bytes: size_of::<ViewConstants>() as u32,
@@ -337,6 +356,7 @@ impl Shadows {
             fragment: shaders::BLOCKER_FRAG.with(&[]),
             constants: &[],
             storage_buffers: &[6, 7],
+            uniform_buffers: &[],
             texel_buffers: &[],
             textures: &[],
             push_constant_bytes: size_of::<ViewConstants>() as u32,

@@ -73,22 +73,22 @@ pub struct SolidView {
 }
 
 impl SolidView {
-    /// For pictures of this size; `on`: what is compiled in.
+    /// For pictures of this size; `on`: what is compiled in, with these specialisation constants.
     ///
     /// # Errors
     /// As [`Solids::new`].
-    pub fn new(gpu: &Arc<Gpu>, view: &View, on: &[&str]) -> Result<Self> {
+    pub fn new(gpu: &Arc<Gpu>, view: &View, on: &[&str], constants: &[u32]) -> Result<Self> {
         let target = Target::sampled(gpu, "the solids", [view.width, view.height], 2, true)?;
-        let shadowed = [5, 6, 7];
         let textures = [10, 11, 12, 13, 14, 17];
         let info = PipelineInfo {
             vertex: shaders::SOLID_VERT.with(on),
             fragment: shaders::SOLID_FRAG.with(on),
-            constants: &[],
-            storage_buffers: match (on.contains(&"LIT"), on.contains(&"SHADOWS")) {
-                (false, _) => &shadowed[2..],
-                (true, false) => &[5, 7],
-                (true, true) => &shadowed,
+            constants,
+            storage_buffers: &[7],
+            uniform_buffers: match (on.contains(&"LIT"), on.contains(&"SHADOWS")) {
+                (false, _) => &[],
+                (true, false) => &[5],
+                (true, true) => &[5, 6],
             },
             texel_buffers: &[],
             textures: if on.contains(&"SHADOWS") { &textures } else { &textures[5..] },
