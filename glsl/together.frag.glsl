@@ -68,13 +68,19 @@ void main() {
     uint passes = 0;
     float z = view.near;
     if (is_begun) {
-        // Any of the parts that it leaves may be one that it begins in.
+        // Any of the parts that it leaves may be one that it begins in: as many as it leaves more often than it enters.
+        int begun = 0;
         for (int i = first; i < last; i++) {
             uint leave = texelFetch(crossings, i).x;
-            if ((leave & LEAVES) == 0) continue;
+            if ((leave & LEAVES) == 0) {
+                begun--;
+                continue;
+            }
+            begun++;
             uint place = back_to_start(leave & ~LEAVES, ray, passes);
             if (place != NOWHERE) begin_at(place, ray);
         }
+        is_left = is_left || int(walkers) < begun;
     }
     int next = first;
     while (!is_left && passes < MOST_PASSES) {
@@ -100,7 +106,7 @@ void main() {
                 texture_of(places[i] >> 2, rows);
                 samples = max(samples, sample_count(path_in(rows, ray), z, stop));
             }
-            passes += samples * (walkers + 1);
+            passes += samples * (walkers * PASSES_A_SAMPLE + 1);
             float step = (stop - z) / float(samples);
             for (uint sample_index = 0; sample_index < samples; sample_index++) {
                 float at = z + (float(sample_index) + 0.5) * step;

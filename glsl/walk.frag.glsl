@@ -35,7 +35,10 @@ void main() {
     float from = view.near;
     uint passes = 0;
     bool strays = false;
-    if (is_begun) place = back_to_start(texelFetch(crossings, next).x & ~LEAVES, ray, passes);
+    if (is_begun) {
+        place = back_to_start(texelFetch(crossings, next).x & ~LEAVES, ray, passes);
+        strays = place == NOWHERE;
+    }
     // Of the tetrahedron that the ray is in.
     uint cell = 0;
     Path path = Path(vec3(0.0), vec3(0.0), 0.0);
@@ -68,8 +71,7 @@ void main() {
                 texture_of(cell, rows);
                 path = path_in(rows, ray);
                 steps = steps_of(path, segment);
-                passes += PASSES_A_STEP * steps.count;
-                first = seek(path, steps, 0);
+                first = seek(path, steps, 0, passes);
                 from = segment.y;
             }
             is_done = from >= farthest;
@@ -89,7 +91,7 @@ void main() {
             planes_of(cell, planes);
             enter(cell, planes, ray);
 #endif
-            march_midpoints(path, steps, first, per_depth, light);
+            march_midpoints(path, steps, first, per_depth, light, passes);
         }
         if (is_done || transmittance(light.gathered) <= SATURATED) break;
     }

@@ -128,6 +128,77 @@ fn quiet_is_silent_and_json_is_json() {
 }
 
 #[test]
+fn what_was_chosen_is_explained_and_can_be_switched_off() {
+    let desk = Desk::new();
+    let render = ["render", "scene.toml", "--size", "16x16", "--explain"];
+    let said = text(&desk.run(&render).stdout);
+    for part in ["chosen:", "  traversal ", "walk", "left out:", "  - ", "counted:", "took:", "march"] {
+        assert!(said.contains(part), "{part}: {said}");
+    }
+    let chosen = |more: &[&str], about: &str| {
+        let output = desk.run(&[&render[..], &["--json"], more].concat());
+        let value: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+        let plan = value["plan"].as_array().unwrap().clone();
+        plan.into_iter().find(|choice| choice["about"] == about).unwrap()["chosen"].clone()
+    };
+    assert_eq!(chosen(&[], "kept"), "on");
+    assert_eq!(chosen(&["--no-skip", "kept", "--no-skip", "saturation"], "kept"), "off");
+    assert_eq!(chosen(&["--no-skip", "kept", "--no-skip", "saturation"], "saturation"), "off");
+    assert_eq!(chosen(&["-D", "march.no_skip=[\"levels\"]"], "levels"), "off");
+    assert_eq!(chosen(&["-D", "march.traversal=sort"], "traversal"), "sort");
+    desk.refuses(&["render", "scene.toml", "--no-skip", "corners"], 2, &["corners", "empty-space"]);
+    desk.refuses(
+        &[&RENDER[..], &["-D", "march.no_skip=[\"corners\"]"]].concat(),
+        2,
+        &["corners", "empty-space"],
+    );
+    let frames = [&render[..], &["--frames", "all"]].concat();
+    desk.refuses(&frames, 2, &["--explain tells of one picture"]);
+}
+
+#[test]
+fn a_loss_of_speed_is_told() {
+    let desk = Desk::new();
+    let bench = [
+        "bench",
+        "scene.toml",
+        "-D",
+        "image.size=[16, 16]",
+        "--steps",
+        "0.5",
+        "--samples",
+        "1",
+        "--runs",
+        "1",
+    ];
+    let output = desk.run(&bench);
+    assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+    assert!(text(&output.stdout).contains("| scene | paper's samples | as accurate | times as fast |"));
+    let path = desk.path().join("out/bench/results.json");
+    let mut results: serde_json::Value = serde_json::from_slice(&fs::read(path).unwrap()).unwrap();
+    // A machine on which the paper's plan took a minute.
+    let paper = results["scenes"][0]["points"].as_array_mut().unwrap();
+    let paper = paper.iter_mut().find(|point| point["plan"] == "paper").unwrap();
+    paper["time"]["median"] = 60_000.0.into();
+    desk.write("fast.json", results.to_string());
+    let told = desk.run(&[&bench[..], &["--baseline", "fast.json"]].concat());
+    assert_eq!(told.status.code(), Some(1));
+    let told = text(&told.stderr);
+    assert!(told.contains("slower than the baseline: scene, 1 samples"), "{told}");
+    paper_is_gone(&mut results);
+    desk.write("none.json", results.to_string());
+    let refused = [&bench[..], &["--baseline", "none.json"]].concat();
+    desk.refuses(&refused, 3, &["none.json", "no speed-ups"]);
+    desk.refuses(&["bench", "--suite", "slow"], 2, &["slow", "gate"]);
+    desk.refuses(&["bench", "--suite", "gate"], 3, &["gate.toml"]);
+}
+
+fn paper_is_gone(results: &mut serde_json::Value) {
+    let points = results["scenes"][0]["points"].as_array_mut().unwrap();
+    points.retain(|point| point["plan"] != "paper");
+}
+
+#[test]
 fn a_size_on_the_command_line_counts() {
     let desk = Desk::new();
     let output = desk.run(&[RENDER, &["--size", "12x7", "--json"]].concat());

@@ -40,6 +40,7 @@ fn shell_pipeline(push_constant_bytes: u32) -> PipelineInfo<'static> {
         fragment: shaders::SHELL_FRAG.with(&[]),
         constants: &[],
         storage_buffers: &[0, 1, 2],
+        uniform_buffers: &[],
         texel_buffers: &[],
         textures: &[8],
         push_constant_bytes,

@@ -7,8 +7,9 @@ use mesoshell::gpu::shaders::{self, Spirv};
 use mesoshell::method::shell::ViewConstants;
 use mesoshell::method::shell::lit::{Frame, LightSource, Lighting, LitCell};
 use mesoshell::method::shell::seen::{Cell, Tile};
-use mesoshell::method::shell::shadows::{Blocker, LightPicture};
+use mesoshell::method::shell::shadows::{Blocker, LightPicture, MOST_PICTURES};
 use mesoshell::method::shell::solids::Triangle;
+use mesoshell::scene::shading::MOST_LIGHTS;
 use rspirv::binary::parse_words;
 use rspirv::dr::{Instruction, Loader, Module, Operand};
 use rspirv::spirv::{Decoration, Op};
@@ -52,7 +53,9 @@ fn layout(shader: Spirv, name: &str) -> (Vec<(String, u32)>, Option<u32>) {
     let array = module
         .types_global_values
         .iter()
-        .find(|i| matches!(i.class.opcode, Op::TypeRuntimeArray | Op::TypeArray) && id_of(&i.operands[0]) == id)
+        .find(|i| {
+            matches!(i.class.opcode, Op::TypeRuntimeArray | Op::TypeArray) && id_of(&i.operands[0]) == id
+        })
         .and_then(|i| i.result_id);
     let stride = array.and_then(|array| {
         module
@@ -133,7 +136,12 @@ fn nothing_is_compiled_in_that_a_scene_does_not_need() {
     let of_shadows: &[&str] = &["light_pictures", "curve_0", "let_through"];
     let of_solids: &[&str] = &["solid_depth", "solid_depths"];
     let of_depth: &[&str] = &["out_depth"];
-    for family in [&shaders::SHELL_FRAG, &shaders::CYCLE_FRAG] {
+    let of_leaps: &[&str] = &["proximity"];
+    for family in [&shaders::SHELL_FRAG, &shaders::WALK_FRAG] {
+        let (without, with) = (words(family.with(&[])), words(family.with(&["SPARSE"])));
+        assert!(of_leaps.iter().all(|name| !without.contains(name) && with.contains(name)));
+    }
+    for family in [&shaders::SHELL_FRAG, &shaders::CYCLE_FRAG, &shaders::WALK_FRAG, &shaders::TOGETHER_FRAG] {
         let switches =
             [("LIT", of_light), ("SHADOWS", of_shadows), ("SOLIDS", of_solids), ("DEPTH", of_depth)];
         for (switch, names) in switches {
@@ -146,6 +154,8 @@ fn nothing_is_compiled_in_that_a_scene_does_not_need() {
     }
     let shell = |on: &[&str]| bindings(shaders::SHELL_FRAG.with(on));
     assert_eq!(shell(&[]), [8]);
+    assert_eq!(shell(&["SPARSE"]), [8, 22]);
+    assert_eq!(bindings(shaders::WALK_FRAG.with(&[])), [8, 18, 19, 20, 21]);
     assert_eq!(shell(&["SOLIDS"]), [8, 15]);
     assert_eq!(shell(&["LIT"]), [3, 4, 5, 8, 9]);
     assert_eq!(shell(&["LIT", "SHADOWS"]), [3, 4, 5, 6, 8, 9, 10, 11, 12, 13]);
@@ -206,6 +216,15 @@ fn structs_of_solids_and_shadows_agree() {
             host!(LightPicture: from_world, middle, half_side, pixel, is_parallel, opacity_distances);
         assert_eq!((members, stride), (expected, Some(size_of::<LightPicture>() as u32)));
     }
+}
+
+/// Arrays of uniform buffers are as long as the host fills them.
+#[test]
+fn lights_are_as_many_as_the_host_uploads() {
+    let lights = include_str!("../glsl/include/lights.glsl");
+    assert!(lights.contains(&format!("const uint MOST_LIGHTS = {MOST_LIGHTS};")));
+    assert!(lights.contains("const uint MOST_PICTURES = 6 * MOST_LIGHTS;"));
+    assert_eq!(MOST_PICTURES, 6 * MOST_LIGHTS);
 }
 
 #[test]

@@ -228,7 +228,10 @@ fn mistakes_are_told_before_the_first_frame() {
         (track("timeline.frames", "[0]", "[2]"), "cannot change in time"),
         (track("volume.recipe", "[0]", "[\"a\"]"), "nothing between these values"),
         (track("volume.vary.cover", "[0]", "[1]"), "cover"),
-        (track("shell.thickness_map", "[0, 1]", "[\"none.png\", \"none.png\"]") + "ease = \"step\"\n", "none.png"),
+        (
+            track("shell.thickness_map", "[0, 1]", "[\"none.png\", \"none.png\"]") + "ease = \"step\"\n",
+            "none.png",
+        ),
         (
             track("camera", "[0]", "[1]") + &track("camera.fov", "[0]", "[1]"),
             "`camera.fov` has a track already, that of `camera`",

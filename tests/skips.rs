@@ -42,10 +42,8 @@ fn difference([a, b]: [&Frame; 2]) -> f64 {
 
 #[test]
 fn leaps_change_nothing() {
-    let plans = [
-        (March::Default { step: 0.5 }, Traversal::Walk),
-        (March::Default { step: 0.3 }, Traversal::Sort),
-    ];
+    let plans =
+        [(March::Default { step: 0.5 }, Traversal::Walk), (March::Default { step: 0.3 }, Traversal::Sort)];
     // From ever farther away: coarser levels are read, and several in one tetrahedron.
     for eye in ["camera.fov=34", "camera.fov=120", "camera.eye=[0.2, 7, 16]"] {
         let scene = load("lit-rocks", &[eye]);
@@ -59,7 +57,11 @@ fn leaps_change_nothing() {
         }
     }
     let papers = Scene { march: March::Paper { samples: 10 }, ..load("lit-rocks", &[]) };
-    assert_eq!(with_and_without(Skip::EmptySpace, &papers)[0].1.chosen, "off", "the yardstick is the paper's");
+    assert_eq!(
+        with_and_without(Skip::EmptySpace, &papers)[0].1.chosen,
+        "off",
+        "the yardstick is the paper's"
+    );
 }
 
 #[test]
@@ -97,7 +99,9 @@ fn what_is_kept_is_what_would_be_made_again() {
         method.render(&scene.view);
         method.render(&scene.view)
     });
-    let stages = |frame: &Frame| -> Vec<String> { frame.report.stages.iter().map(|stage| stage.name.clone()).collect() };
+    let stages = |frame: &Frame| -> Vec<String> {
+        frame.report.stages.iter().map(|stage| stage.name.clone()).collect()
+    };
     for stage in ["order", "see", "shadows"] {
         assert!(!stages(&frames[0]).contains(&stage.to_owned()), "{stage} is kept");
         assert!(stages(&frames[1]).contains(&stage.to_owned()), "{stage} is made again");

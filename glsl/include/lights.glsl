@@ -9,7 +9,7 @@ layout(constant_id = 9) const uint CASTING_HIGH = 0; // from the 33rd light on
 layout(constant_id = 10) const uint PICTURES = 1;
 
 const uint MOST_LIGHTS = 64;
-const uint MOST_PICTURES = 160;
+const uint MOST_PICTURES = 6 * MOST_LIGHTS;
 
 struct LightSource {
     vec4 place;  // towards it, or where it is; 1 / falloff, 0 where there is none

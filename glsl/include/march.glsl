@@ -15,13 +15,21 @@ const float LEAST = 1e-30;
 #define radiant fetch // unlit, a texel's colour is what it sends out
 #endif
 
+// Passes through loops that one costs: its own, and one for each light that is not unrolled.
+#ifdef LIT
+const uint PASSES_A_SAMPLE = LIGHTS > UNROLLED ? 1 + LIGHTS - UNROLLED : 1;
+#else
+const uint PASSES_A_SAMPLE = 1;
+#endif
+
 // Straight colour times `amount` of opacity, of a texel whose colour is premultiplied by its own alpha or extinction.
 vec3 emitted(vec4 texel, float amount) {
     return texel.a > LEAST ? texel.rgb * (amount / texel.a) : vec3(0.0);
 }
 
-// Midpoint rule over the steps from number `i` on: the texture is constant over a step, and the exponential is exact.
-void march_midpoints(Path path, Steps steps, uint i, float per_depth, inout Light light) {
+// Midpoint rule over the steps from number `i` on: the texture is constant over a step, and the exponential is exact. Counts passes
+// through loops.
+void march_midpoints(Path path, Steps steps, uint i, float per_depth, inout Light light, inout uint passes) {
     // Where several pixels run at once, a test at the end costs no pass that nobody needs; but a loop whose only end that is lavapipe
     // 22.3 gets wrong: what a pixel that is done has summed is summed again, in part, as the others go on. So it has another at the top.
     for (; i < steps.count;) {
@@ -31,7 +39,8 @@ void march_midpoints(Path path, Steps steps, uint i, float per_depth, inout Ligh
         float alpha = opacity(optical);
         light.depth += transmittance(light.gathered) * alpha * z;
         lay_behind(light.gathered, vec4(emitted(texel, alpha), alpha));
-        i = seek(path, steps, i + 1);
+        passes += PASSES_A_SAMPLE;
+        i = seek(path, steps, i + 1, passes);
         if (i >= steps.count) break;
     }
 }
@@ -132,6 +141,7 @@ void march(Path path, vec2 segment, float per_depth, inout Light light) {
         march_exactly(path, segment, max(per_depth, LEAST), light);
     } else {
         Steps steps = steps_of(path, segment);
-        march_midpoints(path, steps, seek(path, steps, 0), per_depth, light);
+        uint passes = 0;
+        march_midpoints(path, steps, seek(path, steps, 0, passes), per_depth, light, passes);
     }
 }

@@ -68,6 +68,10 @@ uint sample_count(Path path, float entry, float exit) {
     return uint(clamp(ceil(texels / view.step), 1.0, 65535.0));
 }
 
+#ifdef SPARSE
+layout(set = 0, binding = 22) uniform sampler3D proximity; // of src/volume/proximity.rs, in parts of 255
+#endif
+
 // A segment in equal steps.
 struct Steps {
     float begin;
@@ -90,7 +94,7 @@ Steps steps_of(Path path, vec2 segment) {
         level = floor(level_of_detail(path, segment.y));
         is_known = floor(level_of_detail(path, segment.x)) >= level - 1.0;
     }
-    vec3 texels = abs(path.from_depth) * max(floor(view.texels * exp2(-level)), vec3(1.0));
+    vec3 texels = abs(path.from_depth) * vec3(textureSize(proximity, int(level)));
     float texel = max(texels.x, max(texels.y, texels.z)) * size;
     // A little less, for rounding.
     return Steps(segment.x, size, count, is_known ? level : -1.0, 0.999 / max(texel, 1e-4));
@@ -107,29 +111,19 @@ Steps no_steps() {
 #endif
 }
 
-// Passes through loops that a step may cost.
-#ifdef SPARSE
-const uint PASSES_A_STEP = 2;
-#else
-const uint PASSES_A_STEP = 1;
-#endif
-
 // The depth of the sample of a step.
 float middle(Steps steps, uint i) {
     return steps.begin + (float(i) + 0.5) * steps.size;
 }
 
-#ifdef SPARSE
-layout(set = 0, binding = 22) uniform sampler3D proximity; // of src/volume/proximity.rs, in parts of 255
-#endif
-
-// The first step from `i` on in which something may be seen: those that are left out see nothing.
-uint seek(Path path, Steps steps, uint i) {
+// The first step from `i` on in which something may be seen: those that are left out see nothing. Counts passes through its loop.
+uint seek(Path path, Steps steps, uint i, inout uint passes) {
 #ifdef SPARSE
     // It has two ends: see `march_midpoints`.
     for (; i < steps.count;) {
         vec3 point = path.at_eye + middle(steps, i) * path.from_depth;
         float distance = round(255.0 * textureLod(proximity, point, max(steps.level, 0.0)).x);
+        passes++;
         bool is_near = distance == 0.0 || steps.level < 0.0;
         i += is_near ? 0 : 1 + uint((distance - 1.0) * steps.per_texel);
         if (is_near || i >= steps.count) break;

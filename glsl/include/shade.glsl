@@ -27,6 +27,9 @@ struct Spot {
     float agreement;
 };
 
+// Lights that are no loop.
+const uint UNROLLED = 4;
+
 // Adds what it scatters and mirrors of a light.
 void add_light(uint light_index, Spot spot, inout vec3 scattered, inout vec3 mirrored) {
     vec3 to_light;
@@ -67,12 +70,12 @@ vec4 radiant(Path path, float depth) {
     Spot spot = Spot(depth * ray, -normalize(ray), direction, agreement);
     vec3 scattered = lighting.ambient;
     vec3 mirrored = vec3(0.0);
-    // Unrolled by hand: few scenes have more.
+    // UNROLLED by hand: few scenes have more.
     if (LIGHTS > 0) add_light(0, spot, scattered, mirrored);
     if (LIGHTS > 1) add_light(1, spot, scattered, mirrored);
     if (LIGHTS > 2) add_light(2, spot, scattered, mirrored);
     if (LIGHTS > 3) add_light(3, spot, scattered, mirrored);
-    for (uint i = 4; i < LIGHTS; i++) add_light(i, spot, scattered, mirrored);
+    for (uint i = UNROLLED; i < LIGHTS; i++) add_light(i, spot, scattered, mirrored);
     if (GLOW) {
         float brightest = max(texel.r, max(texel.g, texel.b)) / texel.a;
         scattered += lighting.glow * clamp((brightest - lighting.glow_from) / (1.0 - lighting.glow_from), 0.0, 1.0);

@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 
 use clap::Args;
 use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressStyle};
-use mesoshell::bench::{self, Levels, Options, Results, Speedup, Sweep, sweep};
+use mesoshell::bench::{self, Levels, Options, Results, SceneResults, Speedup, Sweep, sweep};
 use mesoshell::gpu::DeviceChoice;
 use mesoshell::method::{METHODS, Setup};
 use mesoshell::progress::{Interrupt, Progress};
@@ -25,8 +25,8 @@ pub struct Arguments {
     /// A sweep file (docs/bench.md lists its keys), or scene files
     #[arg(default_value = "benches/default.toml", value_name = "SWEEP|SCENE", conflicts_with = "suite")]
     files: Vec<PathBuf>,
-    /// The sweep benches/NAME.toml: speed, gate
-    #[arg(long, value_name = "NAME")]
+    /// The sweep benches/NAME.toml
+    #[arg(long, value_name = "NAME", value_parser = ["default", "antialiasing", "speed", "gate"])]
     suite: Option<String>,
     /// Fail, with exit code 1, where a speed-up over the paper's plan is more than 15 % below that in this results.json
     #[arg(long, value_name = "FILE")]
@@ -69,12 +69,9 @@ const LOSS: f64 = 0.15;
 /// Whatever stands between a scene and its picture.
 pub fn run(mut arguments: Arguments, talk: Talk) -> Result<ExitCode> {
     if let Some(name) = &arguments.suite {
-        arguments.files = vec![Path::new("benches").join(name).with_extension("toml")];
+        arguments.files = vec![Path::new("benches").join(format!("{name}.toml"))];
     }
-    let baseline = arguments.baseline.as_deref().map(|file| {
-        Results::read(file).map_err(|error| error.with_help("--baseline takes the results.json of an earlier run"))
-    });
-    let baseline = baseline.transpose()?;
+    let baseline = arguments.baseline.as_deref().map(baseline).transpose()?;
     let antialiasing = antialiasing::sweep(&arguments)?;
     let sweep = antialiasing.is_none().then(|| what(&arguments)).transpose()?;
     let interrupt = Interrupt::default();
@@ -106,12 +103,28 @@ pub fn run(mut arguments: Arguments, talk: Talk) -> Result<ExitCode> {
         talk.warn(warning);
     }
     let results = &outcome.results;
-    talk.result(results, || format!("{}\n\n{}{}", table(results), speedups(results), outcome.report.display()))?;
+    talk.result(results, || {
+        format!("{}\n\n{}{}", table(results), speedups(results), outcome.report.display())
+    })?;
     let slower = baseline.map(|baseline| results.slower_than(&baseline, LOSS)).unwrap_or_default();
     for told in &slower {
         talk.warn(&format!("slower than the baseline: {told}"));
     }
     Ok(if slower.is_empty() { ExitCode::SUCCESS } else { ExitCode::from(1) })
+}
+
+/// Reads results with which others are to be compared.
+fn baseline(file: &Path) -> Result<Results> {
+    let help =
+        "--baseline takes the results.json of an earlier run to its end, with the paper's plan beside others";
+    let results = Results::read(file).map_err(|error| error.with_help(help))?;
+    let mut speedups = results.scenes.iter().flat_map(SceneResults::speedups);
+    match speedups.any(|speedup| speedup.ratio.is_some()) && results.complete {
+        true => Ok(results),
+        false => {
+            Err(Error::input(file, "has no speed-ups to compare with, or was not finished").with_help(help))
+        }
+    }
 }
 
 /// The sweep that the files and options ask for.
@@ -120,7 +133,7 @@ fn what(arguments: &Arguments) -> Result<Sweep> {
         |message: &str, help: &str| Error::Usage { message: message.to_owned(), help: Some(help.to_owned()) };
     let levels_given = arguments.steps.is_some() || arguments.samples.is_some() || arguments.exact;
     let mut sweep = match arguments.files.as_slice() {
-        [file] if sweep::is_sweep(file) => {
+        [file] if arguments.suite.is_some() || sweep::is_sweep(file) => {
             if levels_given {
                 return Err(usage(
                     "a sweep file says itself what is measured",

@@ -184,6 +184,12 @@ fn render(arguments: &Arguments, line: &Arc<FrameLine>, interrupt: &Interrupt) -
             help: Some("choose it for one frame, and give its step by -D march.step=S".into()),
         });
     }
+    if arguments.explain {
+        return Err(Error::Usage {
+            message: "--explain tells of one picture, not of many frames".into(),
+            help: Some("leave out --frames, or leave out --explain".into()),
+        });
+    }
     let mut sequence = Sequence::open(&arguments.scene, &arguments.overrides(), &line.0)?;
     let timeline = *sequence.timeline();
     let frames = match &arguments.frames {

@@ -48,10 +48,10 @@ pub struct Arguments {
     /// Set a key of the scene: -D shell.thickness=0.2; may be given more than once
     #[arg(short = 'D', value_name = "KEY=VALUE")]
     define: Vec<String>,
-    /// Do not leave this out, although it could be; may be given more than once
+    /// Do not leave this out, although it could be; may be given more than once, and replaces the scene's march.no_skip
     #[arg(long, value_name = "NAME", value_parser = skips())]
     no_skip: Vec<String>,
-    /// Tell which way was chosen, what is left out, and why: before the picture is drawn, and what came of it after
+    /// Tell which way was chosen for the scene and what was left out, and why, and what came of it; of one picture
     #[arg(long)]
     pub(super) explain: bool,
     #[command(flatten)]
@@ -142,7 +142,7 @@ pub fn run(arguments: Arguments, talk: Talk) -> Result<ExitCode> {
         let accuracy = accuracy.as_ref().map_or_else(String::new, Accuracy::told);
         let (method, device) = (&report.method, &report.device);
         let explained = plan.as_ref().map_or_else(String::new, |plan| explain(plan, report));
-        format!("{}\n{method} on {device}, {width}x{height}\n{explained}{accuracy}{stages}", output.display())
+        format!("{}\n{method} on {device}, {width}x{height}\n{accuracy}{explained}{stages}", output.display())
     })?;
     let is_kept = rendered.accuracy.as_ref().is_none_or(Accuracy::is_kept);
     Ok(if is_kept { ExitCode::SUCCESS } else { ExitCode::from(1) })

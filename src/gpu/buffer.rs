@@ -83,7 +83,10 @@ impl Buffer {
         if bytes as u64 > limit {
             return Err(Error::Device {
                 message: format!("{name}: {bytes} bytes are more than the device's buffers hold ({limit})"),
-                help: Some("use a mesh with fewer triangles".into()),
+                help: Some(match kind {
+                    Kind::Uniform => "use another device".into(),
+                    _ => "use a mesh with fewer triangles".into(),
+                }),
             });
         }
         let mut buffer = Self::new(gpu, name, bytes as u64, kind, MemoryLocation::CpuToGpu)?;

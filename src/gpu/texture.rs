@@ -67,7 +67,7 @@ impl Texture3d {
         Self::upload_colours(gpu, name, &levels)
     }
 
-    /// Uploads distances, 1 to 255 read as parts of 255, of the box that a sample is in.
+    /// Uploads distances, read as parts of 255, of the box that a sample is in.
     ///
     /// # Errors
     /// As [`Texture3d::upload`].
@@ -80,14 +80,18 @@ impl Texture3d {
         assert_is_pyramid(&levels);
         Self::check_sides(gpu, name, levels[0].0)?;
         // Vulkan has every device sample this format.
-        Self::upload_levels(gpu, name, vk::Format::R8_UNORM, vk::Filter::NEAREST, &levels, |texels| Cow::Borrowed(texels))
+        Self::upload_levels(gpu, name, vk::Format::R8_UNORM, vk::Filter::NEAREST, &levels, |texels| {
+            Cow::Borrowed(texels)
+        })
     }
 
     fn upload_colours(gpu: &Arc<Gpu>, name: &'static str, levels: &[Level<'_, [f32; 4]>]) -> Result<Self> {
         assert_is_pyramid(levels);
         let count = u32::try_from(levels.len()).expect("at most 32 levels");
         let (format, _) = Self::check(gpu, name, levels[0].0, count)?;
-        Self::upload_levels(gpu, name, format.raw(), vk::Filter::LINEAR, levels, |texels| format.encode(texels))
+        Self::upload_levels(gpu, name, format.raw(), vk::Filter::LINEAR, levels, |texels| {
+            format.encode(texels)
+        })
     }
 
     fn upload_levels<T>(

@@ -14,12 +14,12 @@ use toml::Spanned;
 use super::Background;
 use super::Model;
 use super::PIXEL_FOOTPRINT;
-use super::{Skip, Traversal};
 use super::camera::DEFAULT_FOV_DEGREES;
 use super::motion::{DeformSection, TransformSection};
 use super::shading::DEFAULT_SHADOW_SIZE;
 use super::timeline::Ease;
 use super::wind::WindSection;
+use super::{Skip, Traversal};
 use crate::mesh::generate::Generator;
 use crate::mesh::projection::Projection;
 use crate::value::{
@@ -373,7 +373,13 @@ impl Default for ImageSection {
 
 impl Default for MarchSection {
     fn default() -> Self {
-        Self { plan: Plan::Default, step: Step(0.5), samples: Samples(10), traversal: Traversal::default(), no_skip: Vec::new() }
+        Self {
+            plan: Plan::Default,
+            step: Step(0.5),
+            samples: Samples(10),
+            traversal: Traversal::default(),
+            no_skip: Vec::new(),
+        }
     }
 }
 
@@ -491,7 +497,7 @@ recipe = "fog.toml"
                 found += 1;
             }
         }
-        assert_eq!(found, 8 + 12 + 6 + 3 + 4 + 10 + 2 + 3);
+        assert_eq!(found, 8 + 12 + 6 + 3 + 5 + 10 + 2 + 3);
         let text = Text::new("keys", "[mesh]\nfile = \"a.glb\"\nunknown_key = 1".to_owned(), &[]).unwrap();
         let message = text.parse::<SceneFile>(("mesh", "generator")).unwrap_err().to_string();
         let (_, documented) = DOCUMENTATION.split_once("\n## `[mesh]`").unwrap();

@@ -12,7 +12,7 @@ pub enum Skip {
     Saturation,
     /// Levels of detail that nothing is far enough away for.
     Levels,
-    /// What is as it was in the frame before.
+    /// The order, what is seen, and the shadows, where they are as they were in the frame before.
     Kept,
 }
 
@@ -36,7 +36,9 @@ impl Skip {
             Self::EmptySpace => "rays leap over places where nothing of the volume is",
             Self::Saturation => "rays that walk end where 2^-20 of the light is let through",
             Self::Levels => "where all is magnified, no coarser level of detail is compiled in",
-            Self::Kept => "what has not changed since the frame before is not made again",
+            Self::Kept => {
+                "order, what is seen, and shadows are kept where they are as they were in the frame before"
+            }
         }
     }
 }

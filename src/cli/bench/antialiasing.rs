@@ -16,10 +16,10 @@ pub fn sweep(arguments: &Arguments) -> Result<Option<Sweep>> {
         return Ok(None);
     }
     let levels_given = arguments.steps.is_some() || arguments.samples.is_some() || arguments.exact;
-    if levels_given || arguments.runs.is_some() || arguments.resume {
+    if levels_given || arguments.runs.is_some() || arguments.resume || arguments.baseline.is_some() {
         return Err(Error::Usage {
             message: "a sweep of antialiasing takes no time, and says itself what is measured".to_owned(),
-            help: Some("leave out --steps, --samples, --exact, --runs and --resume".to_owned()),
+            help: Some("leave out --steps, --samples, --exact, --runs, --resume and --baseline".to_owned()),
         });
     }
     let mut sweep = Sweep::load(file)?;

@@ -179,13 +179,14 @@ impl Shell {
         let mut texel_buffers = if kind.walks { vec![18, 19, 20, 21] } else { Vec::new() };
         let mut textures = vec![8];
         for &switch in on {
-            let (more_uniform_buffers, more_texel_buffers, more_textures): (&[u32], &[u32], &[u32]) = match switch {
-                "LIT" => (&[5], &[3, 4], &[9]),
-                "SHADOWS" => (&[6], &[], &[10, 11, 12, 13]),
-                "SOLIDS" => (&[], &[], &[15]),
-                "SPARSE" => (&[], &[], &[22]),
-                _ => (&[], &[], &[]),
-            };
+            let (more_uniform_buffers, more_texel_buffers, more_textures): (&[u32], &[u32], &[u32]) =
+                match switch {
+                    "LIT" => (&[5], &[3, 4], &[9]),
+                    "SHADOWS" => (&[6], &[], &[10, 11, 12, 13]),
+                    "SOLIDS" => (&[], &[], &[15]),
+                    "SPARSE" => (&[], &[], &[22]),
+                    _ => (&[], &[], &[]),
+                };
             uniform_buffers.extend(more_uniform_buffers);
             texel_buffers.extend(more_texel_buffers);
             textures.extend(more_textures);
@@ -246,7 +247,10 @@ impl Shell {
                 textures: &[15, 16],
                 ..info
             };
-            Ok::<_, Error>((SolidView::new(&self.gpu, view, on, &kind.constants)?, Pipeline::new(&self.gpu, &target, &layer)?))
+            Ok::<_, Error>((
+                SolidView::new(&self.gpu, view, on, &kind.constants)?,
+                Pipeline::new(&self.gpu, &target, &layer)?,
+            ))
         });
         let lit = match (&self.lit, self.lit_sight(seen, view)) {
             (Some(lit), Some(sight)) => Some(LitView::new(&self.gpu, lit, sight)?),

@@ -208,10 +208,7 @@ impl Sight<'_> {
                     (place.as_vec3().extend(per_falloff as f32), 1.0)
                 }
             };
-            LightSource {
-                place: place.into(),
-                colour: colour.extend(kind).into(),
-            }
+            LightSource { place: place.into(), colour: colour.extend(kind).into() }
         };
         let mut sources: Vec<LightSource> = shading.lights.iter().map(source).collect();
         sources.resize(MOST_LIGHTS, LightSource::zeroed());

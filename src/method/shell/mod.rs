@@ -116,7 +116,7 @@ impl super::Opened for Opened {
         let Self { gpu, progress, interrupt } = *self;
         let texels = longest_span(&scene)?;
         progress.stage("uploading the volume");
-        let volume = DeviceVolume::new(&gpu, &scene.volume)?;
+        let volume = DeviceVolume::new(&gpu, &scene.volume, plan::enough_to_leap(&scene))?;
         let lit = scene.shading.as_ref().map(|shading| Lit::new(&gpu, &scene.shell, shading)).transpose()?;
         let solids = Solids::new(&gpu, &scene.solids)?;
         Ok(Box::new(Shell {
@@ -226,8 +226,13 @@ impl Method for Shell {
         };
         let keeps_shadows = self.shadows.is_some();
         if !keeps_shadows {
-            let shadows =
-                Shadows::draw(&self.gpu, &self.scene, &self.volume.texture, &*self.progress, &self.interrupt)?;
+            let shadows = Shadows::draw(
+                &self.gpu,
+                &self.scene,
+                &self.volume.texture,
+                &*self.progress,
+                &self.interrupt,
+            )?;
             if shadows.is_some() {
                 watch.lap("shadows");
             }

@@ -4,12 +4,18 @@ use super::Shell;
 use super::constants::wanted_samples;
 use super::walk::MOST_SAMPLES;
 use crate::method::Choice;
-use crate::scene::{March, Skip, Traversal};
+use crate::scene::{March, Scene, Skip, Traversal};
 
 /// The part of the volume that must be empty for rays to look how far they may leap: to look costs a fetch for every sample that is
 /// taken, which a lit sample, that costs far more, repays earlier.
 const SPARSE: f64 = 0.5;
 const SPARSE_LIT: f64 = 0.1;
+
+/// The part of the volume that must be empty for rays to leap; `None` where they never do.
+pub(super) fn enough_to_leap(scene: &Scene) -> Option<f64> {
+    let may = scene.skips.allow(Skip::EmptySpace) && matches!(scene.march, March::Default { .. });
+    may.then_some(if scene.shading.is_some() { SPARSE_LIT } else { SPARSE })
+}
 
 impl Shell {
     /// Whether rays walk; else tetrahedra are sorted.
@@ -21,10 +27,7 @@ impl Shell {
 
     /// Whether rays leap over what is empty.
     pub(super) fn leaps(&self) -> bool {
-        let enough = if self.lit.is_some() { SPARSE_LIT } else { SPARSE };
-        self.scene.skips.allow(Skip::EmptySpace)
-            && matches!(self.scene.march, March::Default { .. })
-            && self.volume.emptiness() >= enough
+        enough_to_leap(&self.scene).is_some() && self.volume.is_sparse()
     }
 
     /// See [`Method::plan`](crate::method::Method::plan).
@@ -66,21 +69,37 @@ impl Shell {
         vec![
             choice("traversal", walk.0, walk.1),
             choice(Skip::EmptySpace.name(), on(self.leaps()), leap),
-            choice(Skip::Saturation.name(), on(self.walks() && allows(Skip::Saturation)), saturation.to_owned()),
+            choice(
+                Skip::Saturation.name(),
+                on(self.walks() && allows(Skip::Saturation)),
+                saturation.to_owned(),
+            ),
             choice(Skip::Levels.name(), on(allows(Skip::Levels)), levels.to_owned()),
             choice(Skip::Kept.name(), on(allows(Skip::Kept)), kept.to_owned()),
-            choice("light", on(shading.is_some()), match shading {
-                None => "the scene is unlit: nothing of it is compiled in".to_owned(),
-                Some(_) => format!("{lights} lights"),
-            }),
-            choice("shadows", on(casting > 0), match casting {
-                0 => "no light casts any: nothing of them is compiled in".to_owned(),
-                _ => format!("{casting} of {lights} lights cast them"),
-            }),
-            choice("solids", on(!self.scene.solids.is_empty()), match self.scene.solids.len() {
-                0 => "there are none: nothing of them is compiled in".to_owned(),
-                count => format!("there are {count}"),
-            }),
+            choice(
+                "light",
+                on(shading.is_some()),
+                match shading {
+                    None => "the scene is unlit: nothing of it is compiled in".to_owned(),
+                    Some(_) => format!("{lights} lights"),
+                },
+            ),
+            choice(
+                "shadows",
+                on(casting > 0),
+                match casting {
+                    0 => "no light casts any: nothing of them is compiled in".to_owned(),
+                    _ => format!("{casting} of {lights} lights cast them"),
+                },
+            ),
+            choice(
+                "solids",
+                on(!self.scene.solids.is_empty()),
+                match self.scene.solids.len() {
+                    0 => "there are none: nothing of them is compiled in".to_owned(),
+                    count => format!("there are {count}"),
+                },
+            ),
         ]
     }
 }

@@ -4,6 +4,7 @@ use super::constants::{MOST_SAMPLES, wanted_samples};
 use super::seen::Seen;
 use super::{Shell, Sight};
 use crate::frame::Report;
+use crate::scene::Skip;
 use crate::shell::Limit;
 
 impl Shell {
@@ -54,9 +55,15 @@ impl Shell {
                 report
                     .skipped
                     .push("each ray walks from tetrahedron to tetrahedron: nothing is sorted".into());
+                if self.scene.skips.allow(Skip::Saturation) {
+                    report.skipped.push("rays end where 2^-20 of the light is let through".into());
+                }
             }
         }
-        if !seen.minified {
+        if self.leaps() {
+            report.skipped.push("rays leap over what is empty".into());
+        }
+        if !seen.minified && self.scene.skips.allow(Skip::Levels) {
             report.skipped.push("all is magnified: no level of detail but 0 is compiled in".into());
         }
         match (&self.scene.shading, &self.shadows) {

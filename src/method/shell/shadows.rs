@@ -14,13 +14,14 @@ use rayon::prelude::*;
 
 use super::constants::{ViewConstants, constants_of_volume};
 use super::seen::{Cell, Tile};
+use crate::Result;
 use crate::gpu::{
     Batch, Buffer, Draw, Gpu, Keeps, Pipeline, PipelineInfo, Sampled, Target, Texture3d, draw, shaders,
 };
 use crate::progress::{Interrupt, Progress};
-use crate::scene::{LightView, March, Scene};
+use crate::scene::shading::MOST_LIGHTS;
+use crate::scene::{LightView, March, Scene, Skip};
 use crate::shell::Shell;
-use crate::{Error, Result};
 
 /// `LightPicture` of `glsl/include/picture.glsl`: see there for each member.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Pod, Zeroable)]
@@ -47,8 +48,8 @@ pub struct Blocker {
     pub padding: [u32; 3],
 }
 
-/// `MOST_PICTURES` of `glsl/include/lights.glsl`: with them a uniform buffer is as large as any device takes.
-const MOST_PICTURES: usize = 160;
+/// `MOST_PICTURES` of `glsl/include/lights.glsl`: a point light in the midst of the scene has six.
+pub const MOST_PICTURES: usize = 6 * MOST_LIGHTS;
 
 /// `CURVE_IMAGES` of `glsl/include/curve.glsl`.
 const CURVE_IMAGES: usize = 4;
@@ -114,13 +115,6 @@ impl Shadows {
             let first = views.len();
             views.extend(LightView::of(light, centre, radius, shading.shadow_size));
             ranges.push(first..views.len());
-        }
-        let most = ranges.iter().map(Range::len).max().unwrap_or(0);
-        if ranges.len() * most > MOST_PICTURES {
-            return Err(Error::Usage {
-                message: format!("{} lights cast shadows, from {most} pictures each: too many", ranges.len()),
-                help: Some(format!("let fewer cast them: there may be {MOST_PICTURES} pictures")),
-            });
         }
         progress.stage("drawing shadows");
         let side = shading.shadow_size;
@@ -245,10 +239,11 @@ impl Shadows {
             samples: 1,
             ..ViewConstants::of_volume(&scene.volume)
         };
+        let minified = drawn.minified || !scene.skips.allow(Skip::Levels);
         let info = PipelineInfo {
             vertex: shaders::TILE_VERT.with(&["LIGHT"]),
             fragment: shaders::SHADOW_FRAG.with(&[]),
-            constants: &constants_of_volume(March::default(), drawn.minified, &scene.volume),
+            constants: &constants_of_volume(March::default(), minified, &scene.volume),
             storage_buffers: &[0, 1, 2, 6],
             uniform_buffers: &[],
             texel_buffers: &[],

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use super::lit::Lit;
+use super::plan::enough_to_leap;
 use super::solids::{self, Solids};
 use super::volume::DeviceVolume;
 use super::{Shell, longest_span};
@@ -26,12 +27,12 @@ impl Shell {
             longest_span(&scene)?
         };
 
-        let volume = if same_volume {
+        let volume = if same_volume && enough_to_leap(before) == enough_to_leap(&scene) {
             kept.push("the volume is kept on the device: it is the same".to_owned());
             None
         } else {
             self.progress.stage("uploading the volume");
-            Some(DeviceVolume::new(&self.gpu, &scene.volume)?)
+            Some(DeviceVolume::new(&self.gpu, &scene.volume, enough_to_leap(&scene))?)
         };
         let same_directions = match (&before.shading, &scene.shading) {
             (Some(a), Some(b)) => Arc::ptr_eq(&a.directions, &b.directions) && a.model == b.model,

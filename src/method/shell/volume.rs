@@ -10,25 +10,39 @@ use crate::volume::{Proximity, Pyramid};
 pub struct DeviceVolume {
     /// Of the volume itself.
     pub texture: Texture3d,
-    /// Where anything of it is empty.
+    /// Where enough of it is empty.
     proximity: Option<Texture3d>,
     emptiness: f64,
 }
 
 impl DeviceVolume {
-    /// Uploads a volume.
+    /// Uploads a volume; and where at least the part `enough` of it is empty, the distances by which rays leap, unless `enough` is
+    /// `None`.
     ///
     /// # Errors
     /// As [`Texture3d::upload`].
-    pub fn new(gpu: &Arc<Gpu>, volume: &Pyramid) -> Result<Self> {
+    pub fn new(gpu: &Arc<Gpu>, volume: &Pyramid, enough: Option<f64>) -> Result<Self> {
         let texture = Texture3d::upload(gpu, "the volume", volume)?;
-        let proximity = Proximity::new(volume);
-        let emptiness = proximity.emptiness();
-        let upload = || Texture3d::upload_proximity(gpu, "the volume's distances", &proximity);
-        Ok(Self { texture, proximity: (emptiness > 0.0).then(upload).transpose()?, emptiness })
+        let full = &volume.levels[0].texels;
+        let mut emptiness = full.iter().filter(|texel| texel[3] == 0.0).count() as f64 / full.len() as f64;
+        let mut proximity = None;
+        // Around what is seen less is empty: where these texels are too few, distances need not be known.
+        if enough.is_some_and(|enough| emptiness >= enough) {
+            let distances = Proximity::new(volume);
+            emptiness = distances.emptiness();
+            if enough.is_some_and(|enough| emptiness >= enough) {
+                proximity = Some(Texture3d::upload_proximity(gpu, "the volume's distances", &distances)?);
+            }
+        }
+        Ok(Self { texture, proximity, emptiness })
     }
 
-    /// The part, 0..1, of the full volume in which nothing is seen.
+    /// Whether there are distances by which rays can leap.
+    pub fn is_sparse(&self) -> bool {
+        self.proximity.is_some()
+    }
+
+    /// The part, 0..1, of the full volume in which nothing is seen; at most that, where it is too little to leap.
     pub fn emptiness(&self) -> f64 {
         self.emptiness
     }
@@ -36,6 +50,9 @@ impl DeviceVolume {
     /// By the binding that shaders name.
     pub fn textures(&self) -> Vec<(u32, Sampled<'_>)> {
         let textures = [(8, Some(&self.texture)), (22, self.proximity.as_ref())];
-        textures.into_iter().filter_map(|(binding, texture)| Some((binding, Sampled::Texture(texture?)))).collect()
+        textures
+            .into_iter()
+            .filter_map(|(binding, texture)| Some((binding, Sampled::Texture(texture?))))
+            .collect()
     }
 }
