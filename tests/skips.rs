@@ -15,7 +15,7 @@ use mesoshell::scene::{self, March, Scene, Skip, Skips, Traversal};
 fn load(name: &str, overrides: &[&str]) -> Scene {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(name).with_extension("toml");
     let overrides = overrides.iter().map(|text| (*text).to_owned());
-    let overrides: Vec<String> = overrides.chain(["image.size=[96, 96]".to_owned()]).collect();
+    let overrides: Vec<String> = ["image.size=[96, 96]".to_owned()].into_iter().chain(overrides).collect();
     let mut scene = scene::load(&path, &overrides, &Silent).unwrap_or_else(|error| panic!("{error:?}")).scene;
     scene.view.depth = true;
     scene
@@ -56,6 +56,10 @@ fn leaps_change_nothing() {
             assert_eq!(difference([&with.0, &without.0]), 0.0, "{eye}, {march}, {traversal:?}");
         }
     }
+    // Neighbouring pixels read different levels.
+    let [with, without] = with_and_without(Skip::EmptySpace, &load("animation/flag", &["image.size=[384, 256]"]));
+    assert_eq!(with.1.chosen, "on");
+    assert_eq!(difference([&with.0, &without.0]), 0.0);
     let papers = Scene { march: March::Paper { samples: 10 }, ..load("lit-rocks", &[]) };
     assert_eq!(
         with_and_without(Skip::EmptySpace, &papers)[0].1.chosen,
@@ -83,7 +87,7 @@ fn what_is_behind_the_opaque_does_not_count() {
 
 #[test]
 fn levels_that_nothing_reads_do_not_count() {
-    let near = ["camera.fov=3"];
+    let near = ["camera.fov=0.5"];
     let [with, without] = with_and_without(Skip::Levels, &load("fur-sphere", &near));
     let told = "all is magnified: no level of detail but 0 is compiled in";
     assert!(with.0.report.skipped.iter().any(|skipped| skipped == told), "{:?}", with.0.report.skipped);

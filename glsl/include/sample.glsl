@@ -94,7 +94,8 @@ Steps steps_of(Path path, vec2 segment) {
         level = floor(level_of_detail(path, segment.y));
         is_known = floor(level_of_detail(path, segment.x)) >= level - 1.0;
     }
-    vec3 texels = abs(path.from_depth) * vec3(textureSize(proximity, int(level)));
+    // Not by textureSize: lavapipe 22.3 gives all pixels that run at once that of the first one's level.
+    vec3 texels = abs(path.from_depth) * vec3(max(uvec3(view.texels) >> uint(level), uvec3(1)));
     float texel = max(texels.x, max(texels.y, texels.z)) * size;
     // A little less, for rounding.
     return Steps(segment.x, size, count, is_known ? level : -1.0, 0.999 / max(texel, 1e-4));

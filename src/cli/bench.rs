@@ -74,6 +74,12 @@ pub fn run(mut arguments: Arguments, talk: Talk) -> Result<ExitCode> {
     let baseline = arguments.baseline.as_deref().map(baseline).transpose()?;
     let antialiasing = antialiasing::sweep(&arguments)?;
     let sweep = antialiasing.is_none().then(|| what(&arguments)).transpose()?;
+    if let (Some(baseline), Some(sweep), Some(file)) = (&baseline, &sweep, &arguments.baseline)
+        && baseline.fingerprint != sweep.fingerprint()
+    {
+        return Err(Error::input(file, "its results are of another sweep, or of other scenes, sizes or runs")
+            .with_help("measure a baseline by the same command"));
+    }
     let interrupt = Interrupt::default();
     listen(&interrupt);
     let bar = Arc::new(Bar::new(talk));
@@ -108,7 +114,7 @@ pub fn run(mut arguments: Arguments, talk: Talk) -> Result<ExitCode> {
     })?;
     let slower = baseline.map(|baseline| results.slower_than(&baseline, LOSS)).unwrap_or_default();
     for told in &slower {
-        talk.warn(&format!("slower than the baseline: {told}"));
+        output::complain(&format!("slower than the baseline: {told}"));
     }
     Ok(if slower.is_empty() { ExitCode::SUCCESS } else { ExitCode::from(1) })
 }

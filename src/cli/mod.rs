@@ -28,7 +28,8 @@ Exit codes:
   1    diff: the images differ by more than --threshold; stress: a case fails;
        render --verify: the error is above --max-error;
        gallery: a scene's error is above its bound;
-       animate-check: a frame has a fault
+       animate-check: a frame has a fault;
+       bench --baseline: a speed-up has fallen
   2    the request makes no sense (an unknown option, a bad -D)
   3    an input file is missing, damaged or means something impossible
   4    no usable Vulkan device

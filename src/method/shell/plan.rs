@@ -81,7 +81,7 @@ impl Shell {
                 on(shading.is_some()),
                 match shading {
                     None => "the scene is unlit: nothing of it is compiled in".to_owned(),
-                    Some(_) => format!("{lights} lights"),
+                    Some(_) => format!("lights: {lights}"),
                 },
             ),
             choice(
@@ -89,7 +89,7 @@ impl Shell {
                 on(casting > 0),
                 match casting {
                     0 => "no light casts any: nothing of them is compiled in".to_owned(),
-                    _ => format!("{casting} of {lights} lights cast them"),
+                    _ => format!("cast by {casting} of {lights} lights"),
                 },
             ),
             choice(
