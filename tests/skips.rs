@@ -57,7 +57,8 @@ fn leaps_change_nothing() {
         }
     }
     // Neighbouring pixels read different levels.
-    let [with, without] = with_and_without(Skip::EmptySpace, &load("animation/flag", &["image.size=[384, 256]"]));
+    let [with, without] =
+        with_and_without(Skip::EmptySpace, &load("animation/flag", &["image.size=[384, 256]"]));
     assert_eq!(with.1.chosen, "on");
     assert_eq!(difference([&with.0, &without.0]), 0.0);
     let papers = Scene { march: March::Paper { samples: 10 }, ..load("lit-rocks", &[]) };

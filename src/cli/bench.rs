@@ -77,8 +77,11 @@ pub fn run(mut arguments: Arguments, talk: Talk) -> Result<ExitCode> {
     if let (Some(baseline), Some(sweep), Some(file)) = (&baseline, &sweep, &arguments.baseline)
         && baseline.fingerprint != sweep.fingerprint()
     {
-        return Err(Error::input(file, "its results are of another sweep, or of other scenes, sizes or runs")
-            .with_help("measure a baseline by the same command"));
+        return Err(Error::input(
+            file,
+            "its results are of another sweep, or of other scenes, sizes or runs",
+        )
+        .with_help("measure a baseline by the same command"));
     }
     let interrupt = Interrupt::default();
     listen(&interrupt);

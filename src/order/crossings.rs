@@ -1,4 +1,4 @@
-//! Where the rays of a picture enter the shell and leave it, from the [`abuffer`](super::abuffer): all that a walk along them needs to know.
+//! Where the rays of a picture enter the shell and leave it, from the A-buffer: all that a walk along them needs to know.
 
 use super::abuffer::ABuffer;
 use super::relations::FaceTable;

@@ -37,8 +37,9 @@ impl Proximity {
         let levels = levels.map(|level| {
             let size = pyramid.levels[level].size;
             let mut near = vec![0; seen[level].len()];
-            for other in level.saturating_sub(1)..pyramid.levels.len().min(level + 2) {
-                let within = reached(&seen[other], pyramid.levels[other].size, size);
+            let read = level.saturating_sub(1)..pyramid.levels.len().min(level + 2);
+            for (seen, of) in seen[read.clone()].iter().zip(&pyramid.levels[read]) {
+                let within = reached(seen, of.size, size);
                 near.iter_mut().zip(within).for_each(|(near, within)| *near |= within);
             }
             ProximityLevel { size, distances: distances(&near, size) }
