@@ -147,11 +147,7 @@ fn what_was_chosen_is_explained_and_can_be_switched_off() {
     assert_eq!(chosen(&["-D", "march.no_skip=[\"levels\"]"], "levels"), "off");
     assert_eq!(chosen(&["-D", "march.traversal=sort"], "traversal"), "sort");
     desk.refuses(&["render", "scene.toml", "--no-skip", "corners"], 2, &["corners", "empty-space"]);
-    desk.refuses(
-        &[RENDER, &["-D", "march.no_skip=[\"corners\"]"]].concat(),
-        2,
-        &["corners", "empty-space"],
-    );
+    desk.refuses(&[RENDER, &["-D", "march.no_skip=[\"corners\"]"]].concat(), 2, &["corners", "empty-space"]);
     let frames = [&render[..], &["--frames", "all"]].concat();
     desk.refuses(&frames, 2, &["--explain tells of one picture"]);
 }
