@@ -1,4 +1,5 @@
-//! Where the rays of a picture enter the shell and leave it, from the A-buffer: all that a walk along them needs to know.
+//! Where the rays of a picture enter the shell and leave it, from the A-buffer: all that a
+//! walk along them (M. Garrity, "Raytracing irregular volume data", 1990) needs to know.
 
 use super::abuffer::ABuffer;
 use super::relations::FaceTable;

@@ -1,4 +1,5 @@
-//! The `shell` method: sorted tetrahedra, rasterised and marched (Dufort, Leblanc, Poulin 2005).
+//! The `shell` method: tetrahedra that each ray walks through (Garrity 1990), or that are sorted and rasterised (Dufort, Leblanc,
+//! Poulin 2005), and marched. `plan.rs` tells which way is gone, and what is left out.
 //!
 //! A frame runs top to bottom in `Shell::render`: order, see (what depends on the eye), shadows (once), upload, solids, march,
 //! read back. Deviations from the paper, and why: entry and exit are computed exactly per pixel within conservative outlines

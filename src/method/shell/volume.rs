@@ -1,6 +1,8 @@
-//! The volume on the device.
+//! The volume on the device: its texture, and the distances by which rays leap over what is empty in it.
 
 use std::sync::Arc;
+
+use rayon::prelude::*;
 
 use crate::Result;
 use crate::gpu::{Gpu, Sampled, Texture3d};
@@ -24,7 +26,8 @@ impl DeviceVolume {
     pub fn new(gpu: &Arc<Gpu>, volume: &Pyramid, enough: Option<f64>) -> Result<Self> {
         let texture = Texture3d::upload(gpu, "the volume", volume)?;
         let full = &volume.levels[0].texels;
-        let mut emptiness = full.iter().filter(|texel| texel[3] == 0.0).count() as f64 / full.len() as f64;
+        let mut emptiness =
+            full.par_iter().filter(|texel| texel[3] == 0.0).count() as f64 / full.len() as f64;
         let mut proximity = None;
         // Around what is seen less is empty: where these texels are too few, distances need not be known.
         if enough.is_some_and(|enough| emptiness >= enough) {
