@@ -45,7 +45,7 @@ pub struct Cached {
     pub reused: bool,
 }
 
-/// The reference's picture of the scene's own view: from `folder`, or computed and kept there.
+/// The reference's picture of the scene's own view, one pixel of every square of `every` by `every`: from `folder`, or computed and kept there.
 ///
 /// A file that is damaged is computed again, and `warnings` tells so.
 ///
@@ -53,14 +53,15 @@ pub struct Cached {
 /// [`Error::Interrupted`](crate::Error::Interrupted), and [`Error::Output`](crate::Error::Output) where the picture cannot be kept.
 pub fn reference(
     scene: &Scene,
+    every: u32,
     fingerprint: &Fingerprint,
     folder: &Path,
     warnings: &mut Vec<String>,
     progress: &dyn Progress,
     interrupt: &Interrupt,
 ) -> Result<Cached> {
-    let render = || reference::render(scene, &scene.view, progress, interrupt);
-    kept(fingerprint, [scene.view.width, scene.view.height], folder, warnings, render)
+    let render = || reference::render_thinned(scene, &scene.view, every, progress, interrupt);
+    kept(fingerprint, [scene.view.width / every, scene.view.height / every], folder, warnings, render)
 }
 
 /// As [`fn@reference`], of any picture by the reference: `render` computes it where `folder` has none of that fingerprint.
@@ -159,9 +160,9 @@ mod tests {
     /// The picture, and the warnings on the way to it.
     fn get(scene: &Scene, folder: &Path) -> (Cached, Vec<String>) {
         let mut warnings = Vec::new();
-        let fingerprint = Fingerprint::of_reference(scene, &scene.view);
+        let fingerprint = Fingerprint::of_reference(scene, &scene.view, 1);
         let interrupt = Interrupt::default();
-        let cached = reference(scene, &fingerprint, folder, &mut warnings, &Silent, &interrupt).unwrap();
+        let cached = reference(scene, 1, &fingerprint, folder, &mut warnings, &Silent, &interrupt).unwrap();
         (cached, warnings)
     }
 
@@ -190,7 +191,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let scene = scene();
         let (good, _) = get(&scene, folder.path());
-        let path = path(folder.path(), &Fingerprint::of_reference(&scene, &scene.view));
+        let path = path(folder.path(), &Fingerprint::of_reference(&scene, &scene.view, 1));
         let bytes = std::fs::read(&path).unwrap();
         let mut bit_flipped = bytes.clone();
         bit_flipped[bytes.len() - 777] ^= 1;
@@ -223,8 +224,8 @@ mod tests {
         let file = folder.path().join("file");
         std::fs::write(&file, "").unwrap();
         let (scene, interrupt) = (scene(), Interrupt::default());
-        let fingerprint = Fingerprint::of_reference(&scene, &scene.view);
-        let error = reference(&scene, &fingerprint, &file, &mut Vec::new(), &Silent, &interrupt).unwrap_err();
+        let fingerprint = Fingerprint::of_reference(&scene, &scene.view, 1);
+        let error = reference(&scene, 1, &fingerprint, &file, &mut Vec::new(), &Silent, &interrupt).unwrap_err();
         assert!(matches!(error, Error::Output { .. }), "{error}");
     }
 }

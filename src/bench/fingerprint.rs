@@ -32,9 +32,12 @@ const SCENE_CODE: [&str; 4] = [
 
 impl Fingerprint {
     /// Of everything that the reference's picture of `view` depends on: geometry, texture, medium, light, camera, and the
-    /// reference itself. How finely a method marches is not among it.
-    pub fn of_reference(scene: &Scene, view: &View) -> Self {
-        let builder = Self::builder("reference").numbers(&[tolerance(scene), scene.medium.lod_footprint]);
+    /// reference itself; and that one pixel is drawn of every square of `every` by `every`. How finely a method marches is not among it.
+    pub fn of_reference(scene: &Scene, view: &View, every: u32) -> Self {
+        let mut builder = Self::builder("reference").numbers(&[tolerance(scene), scene.medium.lod_footprint]);
+        if every > 1 {
+            builder = builder.numbers(&[every]);
+        }
         seen(builder, scene, view, &scene.volume.levels)
     }
 
@@ -186,10 +189,11 @@ pub(crate) mod tests {
 
     #[test]
     fn every_change_of_the_picture_is_seen_and_no_other() {
-        let print = |scene: &Scene| Fingerprint::of_reference(scene, &scene.view);
+        let print = |scene: &Scene| Fingerprint::of_reference(scene, &scene.view, 1);
         let original = print(&scene());
         assert_eq!(original.to_string().len(), 32);
         assert_eq!(original, print(&scene()));
+        assert_ne!(original, Fingerprint::of_reference(&scene(), &scene().view, 4));
         for (name, change) in CHANGES {
             let mut changed = scene();
             change(&mut changed);
@@ -248,7 +252,7 @@ pub(crate) mod tests {
 
     #[test]
     fn every_change_of_the_light_is_seen() {
-        let print = |scene: &Scene| Fingerprint::of_reference(scene, &scene.view);
+        let print = |scene: &Scene| Fingerprint::of_reference(scene, &scene.view, 1);
         let original = print(&lit());
         assert_ne!(original, print(&scene()), "unlit");
         assert_eq!(original, print(&lit()));
@@ -288,7 +292,7 @@ pub(crate) mod tests {
 
     #[test]
     fn every_change_of_a_solid_is_seen() {
-        let print = |scene: &Scene| Fingerprint::of_reference(scene, &scene.view);
+        let print = |scene: &Scene| Fingerprint::of_reference(scene, &scene.view, 1);
         let original = print(&solid());
         assert_ne!(original, print(&scene()), "none");
         assert_eq!(original, print(&solid()));

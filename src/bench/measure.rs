@@ -14,7 +14,7 @@ use crate::frame::{Backdrop, Frame, Image};
 use crate::method::{self, Method, Setup};
 use crate::progress::{Progress, Silent};
 use crate::scene::Scene;
-use crate::{Result, metric};
+use crate::{Error, Result, metric};
 
 /// A scene to be measured.
 pub struct Subject<'a> {
@@ -26,6 +26,8 @@ pub struct Subject<'a> {
     pub backdrop: &'a Backdrop,
     /// The points.
     pub settings: &'a [Setting],
+    /// Errors are those of one pixel of every square of so many by so many.
+    pub error_every: u32,
     /// Timed frames of each point.
     pub runs: usize,
     /// The references' folder.
@@ -65,8 +67,20 @@ pub fn measure(
     keep: &mut dyn FnMut(&SceneResults) -> Result<()>,
 ) -> Result<(SceneResults, Pictures)> {
     let scene = subject.scene;
+    if scene.view.width.min(scene.view.height) < subject.error_every {
+        return Err(Error::Usage {
+            message: format!(
+                "{}: a picture of {} x {} pixels has no square of {} pixels a side",
+                subject.path.display(),
+                scene.view.width,
+                scene.view.height,
+                subject.error_every
+            ),
+            help: Some("make size larger, or error_every smaller".to_owned()),
+        });
+    }
     let name = subject.path.file_stem().unwrap_or_default().to_string_lossy();
-    let fingerprint = Fingerprint::of_reference(scene, &scene.view);
+    let fingerprint = Fingerprint::of_reference(scene, &scene.view, subject.error_every);
     let earlier = earlier.filter(|earlier| {
         let same = earlier.fingerprint == fingerprint;
         if !same {
@@ -101,7 +115,15 @@ pub fn measure(
 
     let progress = remaining.reference(&name, seconds_of_rounds);
     let reference =
-        cache::reference(scene, &fingerprint, subject.cache, warnings, &progress, setup.interrupt)?;
+        cache::reference(
+        scene,
+        subject.error_every,
+        &fingerprint,
+        subject.cache,
+        warnings,
+        &progress,
+        setup.interrupt,
+    )?;
 
     let mut results = match earlier {
         Some(earlier) => earlier,
@@ -135,7 +157,7 @@ pub fn measure(
 
     let pictures = results.best_and_worst().map(|index| {
         let position = wanted.iter().position(|&wanted| wanted == index).expect("warmed up above");
-        contenders[position].warm_up.image.clone()
+        contenders[position].warm_up.image.thinned(subject.error_every)
     });
     let backdrop = subject.backdrop.clone();
     Ok((results, Pictures { reference: reference.image, best_and_worst: pictures, backdrop }))
@@ -158,7 +180,7 @@ impl Contender {
 fn points(subject: &Subject<'_>, contenders: &[Contender], reference: &Image) -> Result<Vec<Point>> {
     let background = subject.backdrop.flat_colour();
     let point = |(setting, contender): (&Setting, &Contender)| {
-        let metrics = metric::compare_over(&contender.warm_up.image, reference, background)?.metrics;
+        let metrics = metric::compare_over(&contender.warm_up.image.thinned(subject.error_every), reference, background)?.metrics;
         Ok(Point::new(setting.clone(), &metrics))
     };
     subject.settings.iter().zip(contenders).map(point).collect()

@@ -82,6 +82,7 @@ pub fn run(sweep: &Sweep, options: &Options<'_>, setup: &Setup<'_>) -> Result<Ou
             scene: &loaded.scene,
             backdrop: &loaded.backdrop,
             settings: &sweep.settings,
+            error_every: sweep.error_every,
             runs: sweep.runs as usize,
             cache: options.cache,
         };

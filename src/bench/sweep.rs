@@ -10,7 +10,7 @@ use crate::fingerprint::Fingerprint;
 use crate::method::{self, METHODS};
 use crate::scene::March;
 use crate::scene::text::Text;
-use crate::value::{PictureSize, Runs, Samples, Step};
+use crate::value::{ErrorEvery, PictureSize, Runs, Samples, Step};
 use crate::{Error, Result, input};
 
 /// What is measured.
@@ -24,6 +24,9 @@ pub struct Sweep {
     pub define: Vec<String>,
     /// Width and height instead of the scenes' own, in pixels.
     pub size: Option<[u32; 2]>,
+    /// Errors are those of one pixel of every square of so many by so many: the reference takes as much less time.
+    #[serde(default = "all_pixels", skip_serializing_if = "is_all_pixels")]
+    pub error_every: u32,
     /// What is measured of each scene: every method at every level of quality.
     pub settings: Vec<Setting>,
     /// Timed frames of each point, at least 1; one more comes first and does not count.
@@ -124,6 +127,8 @@ struct SweepFile {
     methods: Option<Spanned<Vec<Spanned<String>>>>,
     plans: Spanned<Plans>,
     size: Option<PictureSize>,
+    #[serde(default = "of_all_pixels")]
+    error_every: ErrorEvery,
     #[serde(default = "five_runs")]
     runs: Runs,
     #[serde(default)]
@@ -142,6 +147,19 @@ struct Plans {
     exact: bool,
 }
 
+fn all_pixels() -> u32 {
+    1
+}
+
+fn of_all_pixels() -> ErrorEvery {
+    ErrorEvery(all_pixels())
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde asks for it")]
+fn is_all_pixels(every: &u32) -> bool {
+    *every == all_pixels()
+}
+
 fn five_runs() -> Runs {
     Runs(5)
 }
@@ -154,6 +172,7 @@ impl Sweep {
             scenes: scenes.to_owned(),
             define: Vec::new(),
             size: None,
+            error_every: all_pixels(),
             settings: settings(methods, levels),
             runs: 3,
         }
@@ -210,6 +229,7 @@ impl Sweep {
             scenes: file.scenes.get_ref().iter().map(|scene| base_dir.join(scene)).collect(),
             define: file.define,
             size: file.size.map(|size| size.0.map(|side| side.0)),
+            error_every: file.error_every.0,
             settings: settings(&methods, &levels),
             runs: file.runs.0,
         })
@@ -270,6 +290,7 @@ mod tests {
 scenes = ['a.toml', '../b.toml']
 methods = ['shell']
 size = [64, 32]
+error_every = 2
 runs = 2
 define = ['shell.thickness=0.1']
 
@@ -287,7 +308,7 @@ exact = true
     fn a_sweep_is_read() {
         let sweep = parse(SWEEP).unwrap();
         assert_eq!(sweep.scenes, [Path::new("benches/a.toml"), Path::new("benches/../b.toml")]);
-        assert_eq!((sweep.size, sweep.runs), (Some([64, 32]), 2));
+        assert_eq!((sweep.size, sweep.runs, sweep.error_every), (Some([64, 32]), 2, 2));
         let marches = [
             March::Default { step: 1.0 },
             March::Default { step: 0.5 },
@@ -301,7 +322,7 @@ exact = true
     #[test]
     fn what_is_left_out_has_its_default() {
         let sweep = parse("scenes = ['a.toml']\nplans = { default = [1] }").unwrap();
-        assert_eq!((sweep.size, sweep.runs, sweep.define.len()), (None, 5, 0));
+        assert_eq!((sweep.size, sweep.runs, sweep.error_every, sweep.define.len()), (None, 5, 1, 0));
         assert_eq!(
             sweep.settings,
             [Setting { method: "shell".to_owned(), march: March::Default { step: 1.0 } }]
@@ -318,6 +339,7 @@ exact = true
         ["'shell'", "'reference'", "'reference'", "compared with"],
         ["[64, 32]", "[64]", "[64]", "a list of 2"],
         ["[64, 32]", "[64, 0]", "0", "from 1 to 32768"],
+        ["every = 2", "every = 0", "0", "from 1 to 64"],
         ["runs = 2", "runs = 0", "0", "from 1 to 1000"],
         ["paper = [4]", "papers = [4]", "papers", "unknown key `papers`"],
         ["[4]", "[4, 0]", "0", "from 1 to 4096"],
@@ -340,7 +362,7 @@ exact = true
         let print = |text: &str| parse(text).unwrap().fingerprint();
         assert_eq!(print(SWEEP), print(&format!("# The same.\n{SWEEP}")));
         for (from, to) in
-            [("a.toml", "c.toml"), ("64", "65"), ("runs = 2", "runs = 3"), ("0.5", "0.51"), ("0.1", "0.2")]
+            [("a.toml", "c.toml"), ("64", "65"), ("every = 2", "every = 1"), ("runs = 2", "runs = 3"), ("0.5", "0.51"), ("0.1", "0.2")]
         {
             assert_ne!(print(SWEEP), print(&SWEEP.replacen(from, to, 1)), "{to}");
         }

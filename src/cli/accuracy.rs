@@ -146,10 +146,10 @@ fn error_of(scene: &Scene, image: &Image, cache: Option<&Path>, setup: &Setup<'_
     let (progress, interrupt) = (setup.progress.as_ref(), setup.interrupt);
     let exact = match cache {
         Some(cache) => {
-            let fingerprint = Fingerprint::of_reference(scene, &scene.view);
+            let fingerprint = Fingerprint::of_reference(scene, &scene.view, 1);
             // Of a damaged file there is no more to say than that it was computed again.
             let mut damaged = Vec::new();
-            bench::cache::reference(scene, &fingerprint, cache, &mut damaged, progress, interrupt)?.image
+            bench::cache::reference(scene, 1, &fingerprint, cache, &mut damaged, progress, interrupt)?.image
         }
         None => reference::render(scene, &scene.view, progress, interrupt)?.image,
     };

@@ -16,4 +16,16 @@ impl Image {
     pub fn new(width: u32, height: u32) -> Self {
         Self { width, height, rgba: vec![[0.0; 4]; width as usize * height as usize] }
     }
+
+    /// One pixel of every square of `every` by `every`, the one at `every / 2` on each axis; incomplete squares are left out.
+    #[must_use]
+    pub fn thinned(&self, every: u32) -> Self {
+        let (width, height) = (self.width / every, self.height / every);
+        let pixel = |x: u32, y: u32| {
+            let (x, y) = (x * every + every / 2, y * every + every / 2);
+            self.rgba[y as usize * self.width as usize + x as usize]
+        };
+        let rgba = (0..height).flat_map(|y| (0..width).map(move |x| pixel(x, y))).collect();
+        Self { width, height, rgba }
+    }
 }

@@ -195,23 +195,39 @@ impl<'a> Reference<'a> {
 /// # Errors
 /// [`Error::Interrupted`](crate::Error::Interrupted) soon after the flag is set.
 pub fn render(scene: &Scene, view: &View, progress: &dyn Progress, interrupt: &Interrupt) -> Result<Frame> {
+    render_thinned(scene, view, 1, progress, interrupt)
+}
+
+/// As [`render`], of the pixels alone that [`Image::thinned`] keeps: a smaller picture of as large a view.
+///
+/// # Errors
+/// As [`render`].
+pub fn render_thinned(
+    scene: &Scene,
+    view: &View,
+    every: u32,
+    progress: &dyn Progress,
+    interrupt: &Interrupt,
+) -> Result<Frame> {
     let mut stopwatch = Stopwatch::start();
     progress.stage("building the bounding volume hierarchy");
     let reference = Reference::new(scene, view);
     stopwatch.lap("hierarchy");
 
     let sample = |x: u32, y: u32, counts: &mut Counts| {
-        let point = DVec2::new(f64::from(x) + 0.5, f64::from(y) + 0.5);
+        let [x, y] = [x, y].map(|place| f64::from(place * every + every / 2) + 0.5);
+        let point = DVec2::new(x, y);
         let (sample, added) = reference.integrate(view.ray_at_unit_depth(point));
         *counts = counts.add(added);
         sample
     };
-    let (samples, counts) = of_all_pixels(view, progress, interrupt, sample)?;
+    let thinned = View { width: view.width / every, height: view.height / every, ..*view };
+    let (samples, counts) = of_all_pixels(&thinned, progress, interrupt, sample)?;
     stopwatch.lap("integrate");
 
     let depth = view.depth.then(|| samples.iter().map(|sample| sample.depth as f32).collect());
     let rgba = samples.iter().map(|sample| sample.rgba.map(|channel| channel as f32)).collect();
-    let image = Image { width: view.width, height: view.height, rgba };
+    let image = Image { width: thinned.width, height: thinned.height, rgba };
     let report = report(stopwatch, counts, &image);
     Ok(Frame { image, depth, report })
 }

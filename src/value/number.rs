@@ -133,6 +133,10 @@ count! {
     /// Timed frames of one point of a benchmark.
     Runs = 1..=1000
 }
+count! {
+    /// The side, in pixels, of the squares of which a benchmark measures the error of one pixel.
+    ErrorEvery = 1..=64
+}
 
 /// Width and height of a picture that fits into memory: at most 2^28 pixels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]

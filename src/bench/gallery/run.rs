@@ -177,7 +177,7 @@ impl Easel<'_> {
         let [width, height] = fitted([scene.view.width, scene.view.height], room);
         let view = View { width, height, ..scene.view };
         let image = method.render(&view)?.image;
-        let fingerprint = Fingerprint::of_reference(scene, &view);
+        let fingerprint = Fingerprint::of_reference(scene, &view, 1);
         let render = || reference::render(scene, &view, &OfReference(self), self.setup.interrupt);
         let cached = cache::kept(&fingerprint, [width, height], self.options.cache, warnings, render)?;
         Ok(Measured {

@@ -109,7 +109,7 @@ pub fn choose(
 /// Of all that a trial's error depends on but the march: the picture, the method, its shaders and the device.
 fn fingerprint(scene: &Scene, method: &Entry, setup: &Setup<'_>) -> Result<Fingerprint> {
     let device = Gpu::open(setup.device, setup.validation)?.info().clone();
-    let of_reference = Fingerprint::of_reference(scene, &scene.view).to_string();
+    let of_reference = Fingerprint::of_reference(scene, &scene.view, 1).to_string();
     let mut builder = Fingerprint::builder("pilot");
     for text in [&of_reference, method.name, &device.name, &device.driver] {
         builder = builder.bytes(text.as_bytes());

@@ -7,10 +7,14 @@ use super::seen::Seen;
 use crate::Result;
 use crate::progress::{Interrupt, Progress};
 use crate::reference::Reference;
-use crate::scene::{Scene, View};
+use crate::scene::{Scene, Shading, View};
 
 /// Largest absolute error: that of f32 sums on the device.
 const TOLERANCE: f64 = 1e-6;
+
+/// The same where a light casts shadows: a hundredth of how far off those are that are read from its pictures, and a digit of it is
+/// as many paths to the light more.
+const SHADOW_TOLERANCE: f64 = 1e-4;
 
 /// Fills in the pixels of `rgba`, and of `depth` where it is wanted, that are not finite although `seen` resolves them per pixel;
 /// returns how many they are. Elsewhere such a pixel is a fault, and stays.
@@ -37,7 +41,9 @@ pub fn fill(
         return Ok(0);
     }
     progress.stage("integrating what the device left");
-    let reference = Reference::new(scene, view).with_tolerance(TOLERANCE);
+    let casts_shadows = scene.shading.as_ref().is_some_and(Shading::casts_shadows);
+    let tolerance = if casts_shadows { SHADOW_TOLERANCE } else { TOLERANCE };
+    let reference = Reference::new(scene, view).with_tolerance(tolerance);
     let sample = |&pixel: &usize| {
         interrupt.check()?;
         let (x, y) = place(pixel);

@@ -92,9 +92,18 @@ fn bundles(
     let length = geometry.edges(level)[axis] * if axis == 2 { 1.0 } else { REACH };
     let [fine, coarse] = [columns.size, size].map(|size| across.map(|axis| size[axis]));
     let bundle = |at: [u32; 3]| {
-        let passages = covered_area(fine, coarse, across.map(|axis| at[axis])).map(|(place, area)| {
-            let mut column = at;
-            (column[across[0]], column[across[1]]) = (place[0], place[1]);
+        let covered = || {
+            covered_area(fine, coarse, across.map(|axis| at[axis])).map(|(place, area)| {
+                let mut column = at;
+                (column[across[0]], column[across[1]]) = (place[0], place[1]);
+                (column, area)
+            })
+        };
+        // Most of what fur and trees are in.
+        if covered().all(|(column, _)| columns.texel(column)[3] == 0.0) {
+            return Passage::default();
+        }
+        let passages = covered().map(|(column, area)| {
             let weight = if axis == 2 { area } else { area * visibility.at(column) };
             let texel = columns.texel(column).map(f64::from);
             (weight, Passage::through(texel, length, columns.quantity))

@@ -26,13 +26,19 @@ impl Passage {
         if alpha == 0.0 {
             return Self::default();
         }
-        let emission = emission(alpha, length, quantity);
-        let light = [red, green, blue].map(|colour| colour * emission);
-        Self { depth: depth(alpha, quantity) * length, light }
+        let depth = depth(alpha, quantity) * length;
+        let emission = match quantity {
+            Quantity::Opacity if length == 1.0 => 1.0,
+            _ => opacity(depth) / alpha,
+        };
+        Self { depth, light: [red, green, blue].map(|colour| colour * emission) }
     }
 
     /// The texel that over that length is such a passage.
     pub fn texel(self, length: f64, quantity: Quantity) -> [f64; 4] {
+        if self.depth == 0.0 {
+            return [0.0; 4];
+        }
         let alpha = match quantity {
             Quantity::Opacity => opacity(self.depth / length),
             Quantity::Extinction => self.depth / length,
@@ -46,10 +52,18 @@ impl Passage {
         [red, green, blue, alpha]
     }
 
+    /// Whether nothing is there.
+    fn is_empty(&self) -> bool {
+        self.depth == 0.0 && self.light == [0.0; 3]
+    }
+
     /// This, with `behind` behind it.
     pub fn before(self, behind: Self) -> Self {
-        if self.depth == 0.0 && self.light == [0.0; 3] {
+        if self.is_empty() {
             return behind;
+        }
+        if behind.is_empty() {
+            return self;
         }
         let transmittance = (-self.depth).exp();
         let light = std::array::from_fn(|c| self.light[c] + transmittance * behind.light[c]);
@@ -70,7 +84,8 @@ impl Passage {
             weights += weight;
         }
         let [red, green, blue, opacity] = sum.map(|sum| sum / weights);
-        Self { depth: thinnest + optical_depth(opacity), light: [red, green, blue] }
+        let beyond = if opacity > 0.0 { optical_depth(opacity) } else { 0.0 };
+        Self { depth: thinnest + beyond, light: [red, green, blue] }
     }
 }
 
@@ -79,13 +94,6 @@ pub fn depth(alpha: f64, quantity: Quantity) -> f64 {
     match quantity {
         Quantity::Opacity => optical_depth(alpha),
         Quantity::Extinction => alpha,
-    }
-}
-
-fn emission(alpha: f64, length: f64, quantity: Quantity) -> f64 {
-    match quantity {
-        Quantity::Opacity if length == 1.0 => 1.0,
-        _ => opacity(depth(alpha, quantity) * length) / alpha,
     }
 }
 
