@@ -3,7 +3,8 @@
 //! A [`Sweep`] says which scenes are measured at which [`Setting`]s; [`run()`] measures it, and writes what it found as
 //! JSON, CSV and a report in HTML. Times are taken in rounds over all points of a scene ([`mod@measure`]), errors against
 //! the f64 reference, whose pictures are kept in a [`cache`]. `docs/bench.md` describes the files key by key. The [`pilot`]
-//! chooses a march by the error that is accepted; [`antialiasing`] compares filters; a [`gallery`] shows many scenes.
+//! chooses a march by the error that is accepted; [`antialiasing`] compares filters; [`scaling`] tells how time grows
+//! with what a scene has; a [`gallery`] shows many scenes.
 
 pub mod antialiasing;
 pub mod cache;
@@ -19,6 +20,7 @@ mod remaining;
 pub mod report;
 pub mod results;
 mod run;
+pub mod scaling;
 mod speedup;
 pub mod sweep;
 

@@ -1,6 +1,7 @@
 //! `mesoshell bench`: run time against error, of a sweep or of some scenes.
 
 mod antialiasing;
+mod scaling;
 
 use std::io::{IsTerminal, stderr};
 use std::path::{Path, PathBuf};
@@ -26,7 +27,7 @@ pub struct Arguments {
     #[arg(default_value = "benches/default.toml", value_name = "SWEEP|SCENE", conflicts_with = "suite")]
     files: Vec<PathBuf>,
     /// The sweep benches/NAME.toml
-    #[arg(long, value_name = "NAME", value_parser = ["default", "antialiasing", "speed", "gate"])]
+    #[arg(long, value_name = "NAME", value_parser = ["default", "antialiasing", "speed", "gate", "scaling"])]
     suite: Option<String>,
     /// Fail, with exit code 1, where a speed-up over the paper's plan is more than 15 % below that in this results.json
     #[arg(long, value_name = "FILE")]
@@ -73,7 +74,8 @@ pub fn run(mut arguments: Arguments, talk: Talk) -> Result<ExitCode> {
     }
     let baseline = arguments.baseline.as_deref().map(baseline).transpose()?;
     let antialiasing = antialiasing::sweep(&arguments)?;
-    let sweep = antialiasing.is_none().then(|| what(&arguments)).transpose()?;
+    let scaling = scaling::sweep(&arguments)?;
+    let sweep = (antialiasing.is_none() && scaling.is_none()).then(|| what(&arguments)).transpose()?;
     if let (Some(baseline), Some(sweep), Some(file)) = (&baseline, &sweep, &arguments.baseline)
         && baseline.fingerprint != sweep.fingerprint()
     {
@@ -91,6 +93,11 @@ pub fn run(mut arguments: Arguments, talk: Talk) -> Result<ExitCode> {
     let cache = arguments.cache.clone().unwrap_or_else(|| arguments.output.join("cache"));
     let options = Options { out: &arguments.output, cache: &cache, resume: arguments.resume };
     let setup = Setup { device: &device, validation: None, progress: &progress, interrupt: &interrupt };
+    if let Some(sweep) = scaling {
+        let outcome = bench::scaling::run(&sweep, &options, &setup);
+        bar.bar.finish_and_clear();
+        return scaling::tell(&outcome?, talk).map(|()| ExitCode::SUCCESS);
+    }
     let Some(sweep) = sweep else {
         let sweep = antialiasing.expect("one of the two was read");
         let outcome = bench::antialiasing::run(&sweep, &options, &setup);

@@ -4,6 +4,7 @@
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::Arc;
+use std::thread;
 use std::time::{Duration, Instant};
 
 use mesoshell::film::mark::{self, Marker};
@@ -12,8 +13,8 @@ use mesoshell::film::{Film, Names};
 use mesoshell::frame::{Backdrop, Frame, Image, Report, Stopwatch, file};
 use mesoshell::gpu::Messages;
 use mesoshell::method::{self, Method, Opened, Setup};
-use mesoshell::progress::{Interrupt, Progress};
-use mesoshell::scene::{Loaded, Sequence, Sizes};
+use mesoshell::progress::{Interrupt, Progress, Silent};
+use mesoshell::scene::{Loaded, Scene, Sequence, Sizes, Skip};
 use mesoshell::{Error, Result};
 use serde::Serialize;
 
@@ -66,15 +67,60 @@ impl Progress for FrameLine {
 struct Stage {
     opened: Option<Box<dyn Opened>>,
     method: Option<Box<dyn Method>>,
+    /// A frame's scene, made while the frame before was drawn.
+    ahead: Option<(u32, Result<Loaded>)>,
+    last: Option<(Arc<Scene>, Arc<Image>, Report)>,
+}
+
+/// A frame that is to be rendered.
+struct Wanted {
+    index: usize,
+    frame: u32,
+    mark: Option<String>,
+}
+
+/// The frames that are asked for.
+struct Queue<'a> {
+    frames: &'a [u32],
+    next: usize,
+    /// Of pictures, that may be up to date: their names, and what makes their marks.
+    pictures: Option<(&'a Names, Marker)>,
+    overwrite: bool,
+    up_to_date: Vec<u32>,
+}
+
+impl Queue<'_> {
+    /// The next that is not up to date.
+    fn next(&mut self, sequence: &Sequence) -> Option<Result<Wanted>> {
+        while let Some(&frame) = self.frames.get(self.next) {
+            self.next += 1;
+            let wanted = |mark| Wanted { index: self.next - 1, frame, mark };
+            let Some((names, marker)) = &mut self.pictures else { return Some(Ok(wanted(None))) };
+            match sequence.inputs(frame).and_then(|inputs| marker.mark(&inputs)) {
+                Err(error) => return Some(Err(error.of(&name(frame)))),
+                Ok(mark) if !self.overwrite && mark::is_on(&names.of(frame), &mark) => {
+                    self.up_to_date.push(frame);
+                }
+                Ok(mark) => return Some(Ok(wanted(Some(mark)))),
+            }
+        }
+        None
+    }
+}
+
+/// Of a frame, for people.
+fn name(frame: u32) -> String {
+    format!("frame {frame}")
 }
 
 struct Drawn {
-    image: Image,
+    image: Arc<Image>,
     backdrop: Backdrop,
     report: Report,
 }
 
 impl Stage {
+    /// Meanwhile the scene of the frame `next` is made, on a thread of its own: two are in memory then.
     fn render(
         &mut self,
         sequence: &mut Sequence,
@@ -87,13 +133,23 @@ impl Stage {
             Some(opened) => opened.admit(&Sizes { picture: size.unwrap_or(sizes.picture), ..*sizes }),
             None => Ok(()),
         };
-        let Loaded { mut scene, backdrop, mut stages } = sequence.at(frame, progress, &admit)?;
+        let loaded = match self.ahead.take() {
+            Some((of, loaded)) if of == frame => loaded,
+            _ => sequence.at(frame, progress, &admit),
+        };
+        let Loaded { mut scene, backdrop, mut stages } = loaded?;
         [scene.view.width, scene.view.height] = size.unwrap_or([scene.view.width, scene.view.height]);
-        if let Some(next) = next {
-            sequence.prefetch(next)?;
+        if let Some((last, image, report)) = &self.last
+            && scene.skips.allow(Skip::Kept)
+            && scene.shows_the_same(last)
+        {
+            let skipped = vec!["the picture is kept: nothing differs from the frame before".to_owned()];
+            let report = Report { stages, skipped, ..report.clone() };
+            return Ok(Drawn { image: image.clone(), backdrop, report });
         }
         let view = scene.view;
         let scene = Arc::new(scene);
+        let kept = scene.clone();
         let mut watch = Stopwatch::start();
         let method = match (&mut self.method, self.opened.take()) {
             (Some(method), _) => {
@@ -109,9 +165,18 @@ impl Stage {
             }
         };
         stages.extend(watch.finish());
-        let Frame { image, mut report, .. } = method.render(&view)?;
+        let (drawn, ahead) = thread::scope(|scope| {
+            let ahead =
+                next.map(|next| scope.spawn(move || (next, sequence.at(next, &Silent, &|_| Ok(())))));
+            let drawn = method.render(&view);
+            (drawn, ahead.map(|ahead| ahead.join().expect("the making of scenes does not panic")))
+        });
+        self.ahead = ahead;
+        let Frame { image, mut report, .. } = drawn?;
         stages.append(&mut report.stages);
         report.stages = stages;
+        let image = Arc::new(image);
+        self.last = Some((kept, image.clone(), report.clone()));
         Ok(Drawn { image, backdrop, report })
     }
 }
@@ -204,11 +269,13 @@ fn render(arguments: &Arguments, line: &Arc<FrameLine>, interrupt: &Interrupt) -
     let setup = Setup { device: &device, validation: messages.as_ref(), progress: &progress, interrupt };
     let entry = method::by_name(&arguments.method).expect("clap lets through the names of the table alone");
     let opened = (entry.open)(&setup)?;
-    let mut marker = match &output {
-        Output::Pictures(_) => Some(Marker::new(entry.name, &opened.device(), arguments.pixels())?),
+    let pictures = match &output {
+        Output::Pictures(names) => Some((names, Marker::new(entry.name, &opened.device(), arguments.pixels())?)),
         Output::Film(..) => None,
     };
-    let mut stage = Stage { opened: Some(opened), method: None };
+    let mut queue =
+        Queue { frames: &frames, next: 0, pictures, overwrite: arguments.overwrite, up_to_date: Vec::new() };
+    let mut stage = Stage { opened: Some(opened), method: None, ahead: None, last: None };
 
     let mut done = Rendered {
         scene: arguments.scene.clone(),
@@ -219,33 +286,24 @@ fn render(arguments: &Arguments, line: &Arc<FrameLine>, interrupt: &Interrupt) -
     };
     let mut film: Option<Film> = None;
     let begun = Instant::now();
-    for (index, &frame) in frames.iter().enumerate() {
-        let name = format!("frame {frame}");
+    let mut coming = queue.next(&sequence);
+    while let Some(wanted) = coming {
+        let Wanted { index, frame, mark } = wanted?;
         let left = (done.rendered > 0).then(|| {
             let a_frame = begun.elapsed() / done.rendered as u32;
             let seconds = (a_frame * (frames.len() - index) as u32).as_secs();
             format!(", {} left", humantime::format_duration(Duration::from_secs(seconds)))
         });
+        let name = name(frame);
         line.0.stage(&format!("{name} ({} of {}{})", index + 1, frames.len(), left.unwrap_or_default()));
         interrupt.check()?;
         let of_frame = |error: Error| error.of(&name);
-        let mut mark = None;
-        if let (Output::Pictures(names), Some(marker)) = (&output, &mut marker) {
-            let path = names.of(frame);
-            let inputs = sequence.inputs(frame).map_err(of_frame)?;
-            let made = marker.mark(&inputs).map_err(of_frame)?;
-            if !arguments.overwrite && mark::is_on(&path, &made) {
-                done.frames.push(RenderedFrame { frame, output: path, report: None });
-                done.up_to_date += 1;
-                continue;
-            }
-            mark = Some(made);
-        }
-
-        let size = arguments.pixels();
-        let next = frames.get(index + 1).copied();
-        let Drawn { image, backdrop, mut report } =
-            stage.render(&mut sequence, frame, next, size, progress.as_ref()).map_err(of_frame)?;
+        // What keeps the frame after this one from being drawn is told when this one is kept.
+        coming = queue.next(&sequence);
+        let next = coming.as_ref().and_then(|wanted| wanted.as_ref().ok()).map(|wanted| wanted.frame);
+        let Drawn { image, backdrop, mut report } = stage
+            .render(&mut sequence, frame, next, arguments.pixels(), progress.as_ref())
+            .map_err(of_frame)?;
         let mut watch = Stopwatch::start();
         let path = match &output {
             Output::Pictures(names) => {
@@ -274,5 +332,11 @@ fn render(arguments: &Arguments, line: &Arc<FrameLine>, interrupt: &Interrupt) -
     }
     drop(stage);
     check_messages(messages.as_ref())?;
+    if let Output::Pictures(names) = &output {
+        done.up_to_date = queue.up_to_date.len();
+        let kept = |&frame: &u32| RenderedFrame { frame, output: names.of(frame), report: None };
+        done.frames.extend(queue.up_to_date.iter().map(kept));
+        done.frames.sort_by_key(|one| frames.iter().position(|&frame| frame == one.frame));
+    }
     Ok(done)
 }

@@ -32,6 +32,14 @@ impl Talk {
         }
     }
 
+    /// Prints what comes before a result, for people alone.
+    ///
+    /// # Errors
+    /// As [`result`](Self::result).
+    pub fn foreword(self, text: &str) -> Result<()> {
+        if self.json { Ok(()) } else { self.result(&(), || text.to_owned()) }
+    }
+
     /// Prints a warning, unless the user wants quiet.
     pub fn warn(self, warning: &str) {
         if !self.quiet {

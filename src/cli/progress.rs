@@ -36,6 +36,11 @@ impl Line {
         Self { bar, prints_stages: !is_terminal && !talk.quiet, current: Mutex::new(None) }
     }
 
+    /// Lets something be said between two drawings of the line.
+    pub fn aside(&self, say: impl FnOnce()) {
+        self.bar.suspend(say);
+    }
+
     /// Ends the current stage, if there is one, and begins the next.
     fn turn_to(&self, next: Option<&str>) {
         let now = Instant::now();

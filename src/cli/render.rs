@@ -9,7 +9,7 @@ use clap::builder::{PossibleValue, PossibleValuesParser};
 use mesoshell::film::{FrameRange, Names};
 use mesoshell::frame::{Report, Stage, Stopwatch, file};
 use mesoshell::gpu::{DeviceChoice, Messages};
-use mesoshell::method::{self, Choice, METHODS, Setup};
+use mesoshell::method::{self, Choice, METHODS, Saving, Setup};
 use mesoshell::progress::{Interrupt, Progress};
 use mesoshell::scene::{self, Loaded, Sizes, Skip, View};
 use mesoshell::value::PictureSize;
@@ -51,7 +51,8 @@ pub struct Arguments {
     /// Do not leave this out, although it could be; may be given more than once, and replaces the scene's march.no_skip
     #[arg(long, value_name = "NAME", value_parser = skips())]
     no_skip: Vec<String>,
-    /// Tell which way was chosen for the scene and what was left out, and why, and what came of it; of one picture
+    /// Tell which way is chosen for the scene and what is left out, and why; and then what came of it, and what each saves, for which
+    /// the picture is drawn up to twenty times more
     #[arg(long)]
     pub(super) explain: bool,
     #[command(flatten)]
@@ -100,6 +101,9 @@ struct Rendered {
     /// With `--explain`.
     #[serde(skip_serializing_if = "Option::is_none")]
     plan: Option<Vec<Choice>>,
+    /// With `--explain`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    savings: Option<Vec<Saving>>,
     /// With `--max-error`.
     #[serde(skip_serializing_if = "Option::is_none")]
     accuracy: Option<Accuracy>,
@@ -128,27 +132,28 @@ pub fn run(arguments: Arguments, talk: Talk) -> Result<ExitCode> {
     }
     let interrupt = Interrupt::default();
     listen(&interrupt);
-    let progress: Arc<dyn Progress> = Arc::new(Line::new(talk));
-    let rendered = render(&arguments, &progress, &interrupt);
-    drop(progress); // The progress line is wiped before anything else is said.
+    let line = Arc::new(Line::new(talk));
+    let rendered = render(&arguments, &line, &interrupt, talk);
+    drop(line); // The progress line is wiped before anything else is said.
     let rendered = rendered?;
     for warning in &rendered.report.warnings {
         talk.warn(warning);
     }
     talk.result(&rendered, || {
-        let Rendered { output, width, height, plan, accuracy, report, .. } = &rendered;
+        let Rendered { output, width, height, savings, accuracy, report, .. } = &rendered;
         let time = |stage: &Stage| format!("{:9.2} ms", stage.milliseconds);
         let stages = table(report.stages.iter().map(|stage| (stage.name.as_str(), time(stage))));
         let accuracy = accuracy.as_ref().map_or_else(String::new, Accuracy::told);
         let (method, device) = (&report.method, &report.device);
-        let explained = plan.as_ref().map_or_else(String::new, |plan| explain(plan, report));
+        let explained = savings.as_ref().map_or_else(String::new, |savings| explain(savings, report));
         format!("{}\n{method} on {device}, {width}x{height}\n{accuracy}{explained}{stages}", output.display())
     })?;
     let is_kept = rendered.accuracy.as_ref().is_none_or(Accuracy::is_kept);
     Ok(if is_kept { ExitCode::SUCCESS } else { ExitCode::from(1) })
 }
 
-fn render(arguments: &Arguments, progress: &Arc<dyn Progress>, interrupt: &Interrupt) -> Result<Rendered> {
+fn render(arguments: &Arguments, line: &Arc<Line>, interrupt: &Interrupt, talk: Talk) -> Result<Rendered> {
+    let progress: &Arc<dyn Progress> = &(line.clone() as Arc<dyn Progress>);
     let scene = &arguments.scene;
     let output = arguments.output.clone().unwrap_or_else(|| {
         let mut name = scene.file_stem().unwrap_or("scene".as_ref()).to_owned();
@@ -189,9 +194,15 @@ fn render(arguments: &Arguments, progress: &Arc<dyn Progress>, interrupt: &Inter
     stages.extend(watch.finish());
 
     let plan = arguments.explain.then(|| method.plan());
+    if let Some(plan) = &plan {
+        let mut said = Ok(());
+        line.aside(|| said = talk.foreword(&chosen(plan)));
+        said?;
+    }
     let mut frame = method.render(&view)?;
     frame.report.warnings.extend(warning);
     drop(method);
+    let savings = arguments.explain.then(|| method::savings(entry, &loaded, &setup)).transpose()?;
     check_messages(messages.as_ref())?;
 
     let mut watch = Stopwatch::start();
@@ -206,16 +217,25 @@ fn render(arguments: &Arguments, progress: &Arc<dyn Progress>, interrupt: &Inter
     stages.extend(watch.finish());
     frame.report.stages = stages;
     let View { width, height, .. } = view;
-    Ok(Rendered { scene: scene.clone(), output, width, height, plan, accuracy, report: frame.report })
+    Ok(Rendered { scene: scene.clone(), output, width, height, plan, savings, accuracy, report: frame.report })
 }
 
-/// What was chosen, and what came of it.
-fn explain(plan: &[Choice], report: &Report) -> String {
+/// What is chosen.
+fn chosen(plan: &[Choice]) -> String {
     let chosen = |choice: &Choice| format!("{:4}  {}", choice.chosen, choice.why);
-    let plan = table(plan.iter().map(|choice| (choice.about, chosen(choice))));
+    format!("chosen:\n{}", table(plan.iter().map(|choice| (choice.about, chosen(choice)))))
+}
+
+/// What came of it.
+fn explain(savings: &[Saving], report: &Report) -> String {
+    let saved = |saving: &Saving| {
+        let Saving { with, without, difference, .. } = saving;
+        format!("{:9.2} ms of {without:.2} ms; the picture differs by {difference:.1e}", without - with)
+    };
+    let saved = table(savings.iter().map(|saving| (saving.skip.name(), saved(saving))));
     let counts = table(report.counts.iter().map(|(name, count)| (name.as_str(), format!("{count:9}"))));
     let skipped: String = report.skipped.iter().map(|skipped| format!("  - {skipped}\n")).collect();
-    format!("chosen:\n{plan}\nleft out:\n{skipped}counted:\n{counts}\ntook:\n")
+    format!("left out:\n{skipped}saved, where the eye stays where it is:\n{saved}\ncounted:\n{counts}\ntook:\n")
 }
 
 fn skips() -> PossibleValuesParser {

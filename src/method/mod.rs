@@ -2,7 +2,10 @@
 //! the method alone. A new method is a file here, its shaders, and a line in [`METHODS`].
 
 pub mod reference;
+mod savings;
 pub mod shell;
+
+pub use savings::{Saving, savings};
 
 use std::sync::Arc;
 

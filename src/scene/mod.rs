@@ -186,6 +186,16 @@ pub fn texel_edges(shell: &Shell, size: [u32; 3]) -> [f64; 3] {
 }
 
 impl Scene {
+    /// Whether `other` has the same picture because nothing in it is another. Of large parts that are not shared it is not known.
+    pub fn shows_the_same(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.shell, &other.shell)
+            && Arc::ptr_eq(&self.volume, &other.volume)
+            && Arc::ptr_eq(&self.solids, &other.solids)
+            && (self.medium, self.view, self.march) == (other.medium, other.view, other.march)
+            && (self.traversal, self.skips) == (other.traversal, other.skips)
+            && self.shading == other.shading
+    }
+
     /// The pyramid above the same full volume by another filter.
     pub fn filtered(&self, filter: Filter) -> Pyramid {
         let full = self.volume.levels[0].clone();

@@ -3,7 +3,6 @@
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::thread::JoinHandle;
 use std::time::Duration;
 
 use glam::DVec2;
@@ -26,7 +25,7 @@ use super::{
 };
 use crate::frame::{Backdrop, Stopwatch};
 use crate::mesh::Mesh;
-use crate::progress::{Progress, Silent};
+use crate::progress::Progress;
 use crate::shell::{Shell, ShellOptions, Wind};
 use crate::volume::grey::Grey;
 use crate::volume::{Directions, Haze, Pyramid};
@@ -93,7 +92,7 @@ type OfSolidFiles = (Option<BaseSection>, Vec<Spanned<SolidSection>>);
 /// The base mesh, where it is one.
 type OfSolids = (Same<Solids>, Option<Same<Mesh>>);
 
-/// How a volume is made: all that a thread needs that makes it ahead.
+/// How a volume is made.
 struct VolumeWork {
     source: VolumeSource,
     section: VolumeSection,
@@ -128,12 +127,6 @@ impl VolumeWork {
     }
 }
 
-/// A volume that a thread makes.
-struct Ahead {
-    of: Texels,
-    thread: JoinHandle<Result<Arc<Pyramid>>>,
-}
-
 /// The parts of the last scene.
 #[derive(Default)]
 pub(super) struct Parts {
@@ -146,8 +139,6 @@ pub(super) struct Parts {
     /// The shell before that, whose memory the next may have.
     spare: Option<Arc<Shell>>,
     volume: Kept<Texels, Arc<Pyramid>>,
-    /// Of the scene that may come next.
-    ahead: Option<Ahead>,
     directions: Kept<OfDirections, Arc<Directions>>,
     solid_files: Kept<OfSolidFiles, Arc<Solids>>,
     solids: Kept<OfSolids, Arc<[Solid]>>,
@@ -304,19 +295,6 @@ impl Parts {
         Ok(Rest { shell, thickness: checked.file.shell.thickness.0, opacity_distance })
     }
 
-    /// Begins to make the volume of a scene that may come next, unless it is the one that there is. Of the sizes nobody is asked
-    /// until it comes.
-    pub(super) fn prefetch(&mut self, checked: &Checked<'_>, rest: &Rest) {
-        let (texels, work) = checked.volume_work(rest);
-        let is_it = |of: &Texels| *of == texels;
-        let is_there = self.volume.0.as_ref().is_some_and(|(of, _)| is_it(of));
-        if is_there || self.ahead.as_ref().is_some_and(|ahead| is_it(&ahead.of)) {
-            return;
-        }
-        let thread = std::thread::spawn(move || work.make(&Silent, &|_| Ok(()), &|_| Ok(()), &mut |_| {}));
-        self.ahead = Some(Ahead { of: texels, thread });
-    }
-
     /// The scene; without a shell at `rest` its own is.
     ///
     /// # Errors
@@ -357,13 +335,7 @@ impl Parts {
         let own = Rest { shell: shell.clone(), thickness, opacity_distance };
         let section = file.volume.get_ref();
         let (texels, work) = checked.volume_work(rest.unwrap_or(&own));
-        let ahead = &mut self.ahead;
-        let volume = self.volume.get(texels, |texels| {
-            if let Some(Ahead { thread, .. }) = ahead.take_if(|ahead| ahead.of == *texels) {
-                let made = thread.join().expect("making a volume does not panic");
-                stopwatch.lap("load.ahead");
-                return made;
-            }
+        let volume = self.volume.get(texels, |_| {
             work.make(progress, &admit, &|size| checked.resolve(&shell, size), &mut |stage| {
                 stopwatch.lap(stage)
             })

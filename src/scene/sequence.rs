@@ -8,7 +8,7 @@ use super::parts::{Parts, Rest};
 use super::text::Text;
 use super::timeline::{Moment, Timeline, Track};
 use super::{Sizes, files, load, meshes, source};
-use crate::progress::{Progress, Silent};
+use crate::progress::Progress;
 use crate::{Error, Result};
 
 /// An animated scene.
@@ -96,21 +96,6 @@ impl Sequence {
         let file = load::read(&text)?;
         let checked = self.parts.check(&text, &file, &self.base_dir, self.moment(frame), progress)?;
         self.parts.build(&checked, self.rest.as_ref(), progress, admit)
-    }
-
-    /// Begins to load the volume of a frame that will be asked for after the one that was asked for last, on a thread of its own: two are
-    /// in memory then.
-    ///
-    /// # Errors
-    /// As [`Sequence::at`], but for the volume's: those are told when the frame is asked for.
-    pub fn prefetch(&mut self, frame: u32) -> Result<()> {
-        self.check(frame)?;
-        let Some(rest) = &self.rest else { return Ok(()) };
-        let text = self.text_at(frame)?;
-        let file = load::read(&text)?;
-        let checked = self.parts.check(&text, &file, &self.base_dir, self.moment(frame), &Silent)?;
-        self.parts.prefetch(&checked, rest);
-        Ok(())
     }
 
     /// All that makes a frame, for those who keep its picture.

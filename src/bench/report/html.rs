@@ -79,10 +79,8 @@ fn section(page: &mut String, scene: &SceneResults, pictures: &Pictures) {
     for (index, curve) in scene.curves.iter().enumerate() {
         let _ = writeln!(
             page,
-            "<span><svg class=\"key\" viewBox=\"-8 -8 16 16\"><g class=\"{}\"><g class=\"mark full\">{}</g></g></svg> \
-             {}</span>",
-            plot::class(index),
-            plot::shape(index),
+            "<span>{} {}</span>",
+            plot::key(index),
             legend(curve)
         );
     }

@@ -3,7 +3,7 @@
 pub mod csv;
 pub mod html;
 pub(crate) mod picture;
-mod plot;
+pub(crate) mod plot;
 
 /// Names of errors in the order in which they are shown, and what people call them. Others follow by their own name.
 const ERRORS: [(&str, &str); 5] =

@@ -1,4 +1,4 @@
-//! The plot of error over time, both logarithmic, as SVG. Colours and type come from the page's style sheet.
+//! Plots, such as that of error over time, with logarithmic axes, as SVG. Colours and type come from the page's style sheet.
 
 use std::fmt::Write;
 use std::ops::Range;
@@ -65,7 +65,8 @@ pub fn svg(scene: &SceneResults) -> String {
         "<svg class=\"plot\" viewBox=\"0 0 {WIDTH} {HEIGHT}\" role=\"img\" aria-label=\"error over time of {}\">\n",
         escape(&scene.name())
     );
-    grid(&mut svg, &x, &y);
+    grid(&mut svg, &x, &y, ["time per frame (ms), median", "RMSE"], |tick| format!("{tick:e}"));
+    floor(&mut svg, &y);
     let mut front: Vec<[f64; 2]> = points().filter(|point| point.pareto).map(&place).collect();
     front.sort_by(|a, b| a[0].total_cmp(&b[0]));
     let _ = writeln!(svg, "<path class=\"front\" d=\"{}\"/>", staircase(&front));
@@ -97,7 +98,47 @@ pub fn shape(index: usize) -> &'static str {
     }
 }
 
-fn grid(svg: &mut String, x: &Axis, y: &Axis) {
+/// Curves through points `[x, y]`, each positive; a title for who cannot see it, and what the axes are.
+pub fn curves(curves: &[Vec<[f64; 2]>], title: &str, axes: [&str; 2]) -> String {
+    let values = |axis: usize| curves.iter().flatten().map(move |point| point[axis]).filter(|value| *value > 0.0);
+    let x = Axis::around(values(0), 1.25, LEFT..RIGHT);
+    let y = Axis::around(values(1), 1.5, BOTTOM..TOP);
+    let mut svg = format!(
+        "<svg class=\"plot\" viewBox=\"0 0 {WIDTH} {HEIGHT}\" role=\"img\" aria-label=\"{}\">\n",
+        escape(title)
+    );
+    grid(&mut svg, &x, &y, axes, |tick| tick.to_string());
+    for (index, points) in curves.iter().enumerate() {
+        let places: Vec<[f64; 2]> = points
+            .iter()
+            .filter(|point| point.iter().all(|value| *value > 0.0))
+            .map(|point| [x.place(point[0]), y.place(point[1])])
+            .collect();
+        let line: Vec<String> = places.iter().map(|[x, y]| format!("{x:.1},{y:.1}")).collect();
+        let _ = writeln!(svg, "<g class=\"{}\">\n<polyline points=\"{}\"/>", class(index), line.join(" "));
+        for [x, y] in places {
+            let _ = writeln!(
+                svg,
+                "<g class=\"mark full\" transform=\"translate({x:.1} {y:.1})\">{}</g>",
+                shape(index)
+            );
+        }
+        svg += "</g>\n";
+    }
+    svg + "</svg>\n"
+}
+
+/// The sign of a curve, for a legend.
+pub fn key(index: usize) -> String {
+    format!(
+        "<svg class=\"key\" viewBox=\"-8 -8 16 16\"><g class=\"{}\"><g class=\"mark full\">{}</g></g></svg>",
+        class(index),
+        shape(index)
+    )
+}
+
+/// Lines at round values, and the two axes with what they are; `y_label` writes those of the upright one.
+fn grid(svg: &mut String, x: &Axis, y: &Axis, [across, up]: [&str; 2], y_label: impl Fn(f64) -> String) {
     for tick in x.ticks() {
         let at = x.place(tick);
         let _ = writeln!(
@@ -112,11 +153,23 @@ fn grid(svg: &mut String, x: &Axis, y: &Axis) {
         let _ = writeln!(
             svg,
             "<path class=\"grid\" d=\"M{LEFT} {at:.1}H{RIGHT}\"/>\
-             <text class=\"tick\" x=\"{}\" y=\"{:.1}\" text-anchor=\"end\">{tick:e}</text>",
+             <text class=\"tick\" x=\"{}\" y=\"{:.1}\" text-anchor=\"end\">{}</text>",
             LEFT - 8.0,
-            at + 4.0
+            at + 4.0,
+            y_label(tick)
         );
     }
+    let _ = writeln!(
+        svg,
+        "<path class=\"axis\" d=\"M{LEFT} {TOP}V{BOTTOM}H{RIGHT}\"/>\
+         <text class=\"note\" x=\"{RIGHT}\" y=\"{}\" text-anchor=\"end\">{across}</text>\
+         <text class=\"note\" transform=\"translate(14 {TOP}) rotate(-90)\" text-anchor=\"end\">{up}</text>",
+        HEIGHT - 10.0
+    );
+}
+
+/// Where errors are those of rounding.
+fn floor(svg: &mut String, y: &Axis) {
     if y.values.contains(&ROUNDING_FLOOR) {
         let at = y.place(ROUNDING_FLOOR);
         let _ = writeln!(
@@ -127,13 +180,6 @@ fn grid(svg: &mut String, x: &Axis, y: &Axis) {
             at + 14.0
         );
     }
-    let _ = writeln!(
-        svg,
-        "<path class=\"axis\" d=\"M{LEFT} {TOP}V{BOTTOM}H{RIGHT}\"/>\
-         <text class=\"note\" x=\"{RIGHT}\" y=\"{}\" text-anchor=\"end\">time per frame (ms), median</text>\
-         <text class=\"note\" transform=\"translate(14 {TOP}) rotate(-90)\" text-anchor=\"end\">RMSE</text>",
-        HEIGHT - 10.0
-    );
 }
 
 /// The border of what no point reaches: from each point of the front level to the time of the next, then down.
