@@ -4,7 +4,7 @@
 CARGO ?= cargo
 TARGET := $(or $(CARGO_TARGET_DIR),target)
 
-.PHONY: demo test bench bench-speed bench-gate gallery recipe-pictures setup setup-test
+.PHONY: demo test bench bench-speed bench-scaling bench-gate gallery recipe-pictures setup setup-test
 
 demo: setup
 	$(CARGO) build --release
@@ -22,6 +22,12 @@ bench-speed: setup
 	$(CARGO) build --release
 	$(TARGET)/release/mesoshell bench --suite speed --output out/bench-speed
 	@echo "the report is in out/bench-speed/report.html"
+
+# How time and memory grow with tetrahedra, pixels and texels.
+bench-scaling: setup
+	$(CARGO) build --release
+	$(TARGET)/release/mesoshell bench --suite scaling --output out/bench-scaling
+	@echo "the report is in out/bench-scaling/scaling.html"
 
 # Fails where such ratios have fallen by more than 15 % since benches/gate.json was committed.
 bench-gate: setup

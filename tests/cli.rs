@@ -132,8 +132,19 @@ fn what_was_chosen_is_explained_and_can_be_switched_off() {
     let desk = Desk::new();
     let render = ["render", "scene.toml", "--size", "16x16", "--explain"];
     let said = text(&desk.run(&render).stdout);
-    let parts =
-        ["chosen:", "  traversal ", "walk", "scene.png\n", "left out:", "  - ", "saved", "differs by", "counted:", "took:", "march"];
+    let parts = [
+        "chosen:",
+        "  traversal ",
+        "walk",
+        "scene.png\n",
+        "left out:",
+        "  - ",
+        "saved",
+        "differs by",
+        "counted:",
+        "took:",
+        "march",
+    ];
     assert!(said.find("chosen:") < said.find("scene.png"), "what is chosen is told before: {said}");
     for part in parts {
         assert!(said.contains(part), "{part}: {said}");

@@ -219,3 +219,42 @@ fn films_have_all_frames() {
     assert!(y4m.starts_with(header));
     assert_eq!(y4m.len(), header.len() + 4 * (6 + 3 * 32 * 32));
 }
+
+/// Nothing but the camera moves, and that in the first half alone.
+#[test]
+fn equal_frames_are_drawn_once() {
+    let folder = Folder::new();
+    let scene =
+        SCENE.replace("at = [0, 2]", "at = [0, 1]").replace("frames = 40", "frames = 40, loops = false");
+    std::fs::write(folder.path("scene.toml"), scene).unwrap();
+    let skipped = |more: &[&str]| -> Vec<bool> {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_mesoshell"));
+        let arguments =
+            ["render", "scene.toml", "--json", "--overwrite", "-o", "####.png", "--frames", "18-24"];
+        let output = command.current_dir(folder.0.path()).args(arguments).args(more).output().unwrap();
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        let result: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+        let frames = result["frames"].as_array().unwrap();
+        let is_kept = |frame: &serde_json::Value| {
+            let skipped = frame["report"]["skipped"].as_array().unwrap();
+            let stages = frame["report"]["stages"].as_array().unwrap();
+            let is_drawn = stages.iter().any(|stage| stage["name"] == "march");
+            let is_kept = skipped.iter().any(|one| one.as_str().unwrap().starts_with("the picture is kept"));
+            assert_ne!(is_drawn, is_kept);
+            is_kept
+        };
+        frames.iter().map(is_kept).collect()
+    };
+    // Frame 21 is at one second: those after it are equal to it.
+    let kept = skipped(&[]);
+    assert_eq!(kept, [false, false, false, false, true, true, true]);
+    let with = pictures(folder.0.path());
+    assert_eq!(skipped(&["--no-skip", "kept"]), [false; 7]);
+    let without = pictures(folder.0.path());
+    // Marks in the files tell of what was allowed; pixels are the same.
+    let pixels = |files: &BTreeMap<String, Vec<u8>>| -> Vec<image::RgbaImage> {
+        files.values().map(|bytes| image::load_from_memory(bytes).unwrap().to_rgba8()).collect()
+    };
+    assert!(pixels(&with) == pixels(&without));
+    assert_ne!(pixels(&with)[0], pixels(&with)[3]);
+}

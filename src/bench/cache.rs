@@ -225,7 +225,8 @@ mod tests {
         std::fs::write(&file, "").unwrap();
         let (scene, interrupt) = (scene(), Interrupt::default());
         let fingerprint = Fingerprint::of_reference(&scene, &scene.view, 1);
-        let error = reference(&scene, 1, &fingerprint, &file, &mut Vec::new(), &Silent, &interrupt).unwrap_err();
+        let error =
+            reference(&scene, 1, &fingerprint, &file, &mut Vec::new(), &Silent, &interrupt).unwrap_err();
         assert!(matches!(error, Error::Output { .. }), "{error}");
     }
 }

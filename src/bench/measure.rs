@@ -114,8 +114,7 @@ pub fn measure(
     let seconds_of_rounds = seconds_a_round * rounds_left as f64;
 
     let progress = remaining.reference(&name, seconds_of_rounds);
-    let reference =
-        cache::reference(
+    let reference = cache::reference(
         scene,
         subject.error_every,
         &fingerprint,
@@ -180,7 +179,12 @@ impl Contender {
 fn points(subject: &Subject<'_>, contenders: &[Contender], reference: &Image) -> Result<Vec<Point>> {
     let background = subject.backdrop.flat_colour();
     let point = |(setting, contender): (&Setting, &Contender)| {
-        let metrics = metric::compare_over(&contender.warm_up.image.thinned(subject.error_every), reference, background)?.metrics;
+        let metrics = metric::compare_over(
+            &contender.warm_up.image.thinned(subject.error_every),
+            reference,
+            background,
+        )?
+        .metrics;
         Ok(Point::new(setting.clone(), &metrics))
     };
     subject.settings.iter().zip(contenders).map(point).collect()

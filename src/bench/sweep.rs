@@ -249,8 +249,9 @@ pub fn is_sweep(path: &Path) -> bool {
 
 /// By the keys that only a sweep has.
 fn looks_like_sweep(text: &str) -> bool {
-    toml::de::DeTable::parse(text)
-        .is_ok_and(|table| ["scenes", "plans"].iter().any(|&key| table.get_ref().get(key).is_some()))
+    toml::de::DeTable::parse(text).is_ok_and(|table| {
+        ["scenes", "plans", "series"].iter().any(|&key| table.get_ref().get(key).is_some())
+    })
 }
 
 /// What is laid over every scene of a sweep: its size, then its own values.
@@ -361,9 +362,14 @@ exact = true
     fn every_change_changes_the_fingerprint() {
         let print = |text: &str| parse(text).unwrap().fingerprint();
         assert_eq!(print(SWEEP), print(&format!("# The same.\n{SWEEP}")));
-        for (from, to) in
-            [("a.toml", "c.toml"), ("64", "65"), ("every = 2", "every = 1"), ("runs = 2", "runs = 3"), ("0.5", "0.51"), ("0.1", "0.2")]
-        {
+        for (from, to) in [
+            ("a.toml", "c.toml"),
+            ("64", "65"),
+            ("every = 2", "every = 1"),
+            ("runs = 2", "runs = 3"),
+            ("0.5", "0.51"),
+            ("0.1", "0.2"),
+        ] {
             assert_ne!(print(SWEEP), print(&SWEEP.replacen(from, to, 1)), "{to}");
         }
     }

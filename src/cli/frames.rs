@@ -166,8 +166,7 @@ impl Stage {
         };
         stages.extend(watch.finish());
         let (drawn, ahead) = thread::scope(|scope| {
-            let ahead =
-                next.map(|next| scope.spawn(move || (next, sequence.at(next, &Silent, &|_| Ok(())))));
+            let ahead = next.map(|next| scope.spawn(move || (next, sequence.at(next, &Silent, &|_| Ok(())))));
             let drawn = method.render(&view);
             (drawn, ahead.map(|ahead| ahead.join().expect("the making of scenes does not panic")))
         });
@@ -270,7 +269,9 @@ fn render(arguments: &Arguments, line: &Arc<FrameLine>, interrupt: &Interrupt) -
     let entry = method::by_name(&arguments.method).expect("clap lets through the names of the table alone");
     let opened = (entry.open)(&setup)?;
     let pictures = match &output {
-        Output::Pictures(names) => Some((names, Marker::new(entry.name, &opened.device(), arguments.pixels())?)),
+        Output::Pictures(names) => {
+            Some((names, Marker::new(entry.name, &opened.device(), arguments.pixels())?))
+        }
         Output::Film(..) => None,
     };
     let mut queue =

@@ -217,7 +217,16 @@ fn render(arguments: &Arguments, line: &Arc<Line>, interrupt: &Interrupt, talk: 
     stages.extend(watch.finish());
     frame.report.stages = stages;
     let View { width, height, .. } = view;
-    Ok(Rendered { scene: scene.clone(), output, width, height, plan, savings, accuracy, report: frame.report })
+    Ok(Rendered {
+        scene: scene.clone(),
+        output,
+        width,
+        height,
+        plan,
+        savings,
+        accuracy,
+        report: frame.report,
+    })
 }
 
 /// What is chosen.
@@ -235,7 +244,9 @@ fn explain(savings: &[Saving], report: &Report) -> String {
     let saved = table(savings.iter().map(|saving| (saving.skip.name(), saved(saving))));
     let counts = table(report.counts.iter().map(|(name, count)| (name.as_str(), format!("{count:9}"))));
     let skipped: String = report.skipped.iter().map(|skipped| format!("  - {skipped}\n")).collect();
-    format!("left out:\n{skipped}saved, where the eye stays where it is:\n{saved}\ncounted:\n{counts}\ntook:\n")
+    format!(
+        "left out:\n{skipped}saved, where the eye stays where it is:\n{saved}\ncounted:\n{counts}\ntook:\n"
+    )
 }
 
 fn skips() -> PossibleValuesParser {

@@ -58,7 +58,8 @@ pub fn savings(entry: &Entry, scene: &Scene, setup: &Setup<'_>) -> Result<Vec<Sa
     for (index, &skip) in on.iter().enumerate() {
         setup.progress.fraction((index + 1) as f64 / (on.len() + 1) as f64);
         setup.interrupt.check()?;
-        let off: Vec<Skip> = Skip::ALL.into_iter().filter(|&other| other == skip || !scene.skips.allow(other)).collect();
+        let off: Vec<Skip> =
+            Skip::ALL.into_iter().filter(|&other| other == skip || !scene.skips.allow(other)).collect();
         let (other, without, _) = draw(Skips::without(&off))?;
         let difference = metric::compare(&frame.image, &other.image)?.max;
         savings.push(Saving { skip, with, without, difference });

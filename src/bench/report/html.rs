@@ -77,12 +77,7 @@ fn section(page: &mut String, scene: &SceneResults, pictures: &Pictures) {
     *page += &plot::svg(scene);
     *page += "<figcaption class=\"legend\">\n";
     for (index, curve) in scene.curves.iter().enumerate() {
-        let _ = writeln!(
-            page,
-            "<span>{} {}</span>",
-            plot::key(index),
-            legend(curve)
-        );
+        let _ = writeln!(page, "<span>{} {}</span>", plot::key(index), legend(curve));
     }
     *page += "<span><svg class=\"wide key\" viewBox=\"-16 -8 32 16\"><path class=\"front\" d=\"M-16-6H0V6H16\"/></svg> \
               Pareto front</span>\n</figcaption>\n</figure>\n";

@@ -100,7 +100,8 @@ pub fn shape(index: usize) -> &'static str {
 
 /// Curves through points `[x, y]`, each positive; a title for who cannot see it, and what the axes are.
 pub fn curves(curves: &[Vec<[f64; 2]>], title: &str, axes: [&str; 2]) -> String {
-    let values = |axis: usize| curves.iter().flatten().map(move |point| point[axis]).filter(|value| *value > 0.0);
+    let values =
+        |axis: usize| curves.iter().flatten().map(move |point| point[axis]).filter(|value| *value > 0.0);
     let x = Axis::around(values(0), 1.25, LEFT..RIGHT);
     let y = Axis::around(values(1), 1.5, BOTTOM..TOP);
     let mut svg = format!(

@@ -6,7 +6,8 @@ pub fn slope(points: &[(f64, f64)]) -> Option<f64> {
         return None;
     }
     let count = points.len() as f64;
-    let mean = |part: fn(&(f64, f64)) -> f64| points.iter().map(|point| part(point).ln()).sum::<f64>() / count;
+    let mean =
+        |part: fn(&(f64, f64)) -> f64| points.iter().map(|point| part(point).ln()).sum::<f64>() / count;
     let (x, y) = (mean(|point| point.0), mean(|point| point.1));
     let along = |point: &(f64, f64)| point.0.ln() - x;
     let squares = points.iter().map(|point| along(point).powi(2)).sum::<f64>();

@@ -92,7 +92,9 @@ fn section(page: &mut String, series: &SeriesResults) {
         for growth in &stages {
             let _ = write!(page, "<td>{:.1}</td>", point.milliseconds(&growth.stage).unwrap_or(f64::NAN));
         }
-        let memory = point.memory.map_or_else(|| "-".to_owned(), |bytes| format!("{:.0}", bytes as f64 / f64::from(1 << 20)));
+        let memory = point
+            .memory
+            .map_or_else(|| "-".to_owned(), |bytes| format!("{:.0}", bytes as f64 / f64::from(1 << 20)));
         let _ = writeln!(page, "<td>{memory}</td></tr>");
     }
     *page += "</tbody>\n</table>\n</div>\n";

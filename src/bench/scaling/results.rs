@@ -96,7 +96,8 @@ impl Point {
 impl SeriesResults {
     /// Concludes from its points.
     pub fn new(name: &str, of: Measure, points: Vec<Point>) -> Self {
-        let stages = points.first().into_iter().flat_map(|point| &point.stages).map(|stage| stage.name.as_str());
+        let stages =
+            points.first().into_iter().flat_map(|point| &point.stages).map(|stage| stage.name.as_str());
         let growth = |stage: &str| {
             let times: Option<Vec<(f64, f64)>> =
                 points.iter().map(|point| Some((point.size as f64, point.milliseconds(stage)?))).collect();

@@ -35,11 +35,17 @@ pub struct Outcome {
 pub fn run(sweep: &Sweep, options: &Options<'_>, setup: &Setup<'_>) -> Result<Outcome> {
     let device = Gpu::open(setup.device, setup.validation)?.info().clone();
     check_writable(&options.out.join("scaling.json"))?;
-    let mut results =
-        Results { schema: SCHEMA, sweep: sweep.clone(), environment: Environment::here(&device), series: Vec::new() };
+    let mut results = Results {
+        schema: SCHEMA,
+        sweep: sweep.clone(),
+        environment: Environment::here(&device),
+        series: Vec::new(),
+    };
     let mut warnings = Vec::new();
     for (index, series) in sweep.series.iter().enumerate() {
-        let part = |done: usize| (index as f64 + done as f64 / series.sizes.len() as f64) / sweep.series.len() as f64;
+        let part = |done: usize| {
+            (index as f64 + done as f64 / series.sizes.len() as f64) / sweep.series.len() as f64
+        };
         let mut points = Vec::new();
         for (done, size) in series.sizes.iter().enumerate() {
             setup.progress.stage(&format!("{}: size {} of {}", series.name, done + 1, series.sizes.len()));

@@ -149,7 +149,10 @@ sizes = [['mesh.segments=8'], ['mesh.segments=16']]
         let sweep = parse(SWEEP).unwrap();
         assert_eq!((sweep.runs, sweep.define.len()), (2, 1));
         let [series] = sweep.series.as_slice() else { panic!("{sweep:?}") };
-        assert_eq!((series.of, series.scene.as_path()), (Measure::Tetrahedra, Path::new("benches/../a.toml")));
+        assert_eq!(
+            (series.of, series.scene.as_path()),
+            (Measure::Tetrahedra, Path::new("benches/../a.toml"))
+        );
         assert_eq!(series.sizes[1], ["march.step=2", "mesh.segments=16"]);
         assert!(looks_like_scaling(SWEEP) && !looks_like_scaling("[plans]"));
     }
@@ -161,7 +164,12 @@ sizes = [['mesh.segments=8'], ['mesh.segments=16']]
             ["runs = 2", "runs = 0", "0", "from 1 to 1000"],
             ["'tetrahedra'", "'triangles'", "'triangles'", "texels"],
             ["of =", "off =", "off", "unknown key `off`"],
-            ["[['mesh.segments=8'], ['mesh.segments=16']]", "[['mesh.segments=8']]", "[['mesh.segments=8']]", "two"],
+            [
+                "[['mesh.segments=8'], ['mesh.segments=16']]",
+                "[['mesh.segments=8']]",
+                "[['mesh.segments=8']]",
+                "two",
+            ],
         ] {
             let text = SWEEP.replacen(from, to, 1);
             assert_ne!(text, SWEEP, "{from}");

@@ -18,7 +18,8 @@ pub fn sweep(arguments: &Arguments) -> Result<Option<Sweep>> {
     let levels_given = arguments.steps.is_some() || arguments.samples.is_some() || arguments.exact;
     if levels_given || arguments.resume || arguments.baseline.is_some() || arguments.cache.is_some() {
         return Err(Error::Usage {
-            message: "a sweep of scaling compares with no reference, and says itself what is measured".to_owned(),
+            message: "a sweep of scaling compares with no reference, and says itself what is measured"
+                .to_owned(),
             help: Some("leave out --steps, --samples, --exact, --resume, --cache and --baseline".to_owned()),
         });
     }
@@ -44,8 +45,7 @@ pub fn tell(outcome: &Outcome, talk: Talk) -> Result<()> {
 
 /// A line for each series and size, in Markdown.
 fn points(results: &Results) -> String {
-    let mut table =
-        "| series | of | size | frame (ms) | memory (MiB) |\n|---|---|---|---|---|\n".to_owned();
+    let mut table = "| series | of | size | frame (ms) | memory (MiB) |\n|---|---|---|---|---|\n".to_owned();
     for series in &results.series {
         for point in &series.points {
             let memory = point.memory.map_or_else(|| "-".to_owned(), |bytes| (bytes >> 20).to_string());
