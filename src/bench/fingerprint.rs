@@ -316,7 +316,7 @@ pub(crate) mod tests {
         let scene = scene();
         assert_ne!(original, Fingerprint::of_supersampled(&scene, &scene.view, 4, 1e-4));
         assert_ne!(original, Fingerprint::of_supersampled(&scene, &scene.view, 8, 1e-5));
-        assert_ne!(original, Fingerprint::of_reference(&scene, &scene.view));
+        assert_ne!(original, Fingerprint::of_reference(&scene, &scene.view, 1));
     }
 
     #[test]
