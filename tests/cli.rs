@@ -156,6 +156,19 @@ fn what_was_chosen_is_explained_and_can_be_switched_off() {
         plan.into_iter().find(|choice| choice["about"] == about).unwrap()["chosen"].clone()
     };
     assert_eq!(chosen(&[], "kept"), "on");
+    let saved = |more: &[&str]| -> Vec<String> {
+        let output = desk.run(&[&render[..], &["--json"], more].concat());
+        let value: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+        let savings = value["savings"].as_array().unwrap().clone();
+        for saving in &savings {
+            assert!(["with", "without"].iter().all(|key| saving[key].as_f64().unwrap() > 0.0), "{saving}");
+            assert!(saving["difference"].as_f64().unwrap() <= 1e-6, "{saving}");
+        }
+        savings.iter().map(|saving| saving["skip"].as_str().unwrap().to_owned()).collect()
+    };
+    assert_eq!(saved(&[]), ["saturation", "levels", "kept"]);
+    assert_eq!(saved(&["--no-skip", "kept", "--no-skip", "saturation"]), ["levels"]);
+    assert_eq!(saved(&["--method", "reference"]), [""; 0]);
     assert_eq!(chosen(&["--no-skip", "kept", "--no-skip", "saturation"], "kept"), "off");
     assert_eq!(chosen(&["--no-skip", "kept", "--no-skip", "saturation"], "saturation"), "off");
     assert_eq!(chosen(&["-D", "march.no_skip=[\"levels\"]"], "levels"), "off");

@@ -225,7 +225,7 @@ fn films_have_all_frames() {
 fn equal_frames_are_drawn_once() {
     let folder = Folder::new();
     let scene =
-        SCENE.replace("at = [0, 2]", "at = [0, 1]").replace("frames = 40", "frames = 40, loops = false");
+        SCENE.replace("at = [0, 2]", "at = [0, 1]").replace("frames = 40", "frames = 40, loop = false");
     std::fs::write(folder.path("scene.toml"), scene).unwrap();
     let skipped = |more: &[&str]| -> Vec<bool> {
         let mut command = Command::new(env!("CARGO_BIN_EXE_mesoshell"));

@@ -187,6 +187,22 @@ mod tests {
     }
 
     #[test]
+    fn few_pixels_are_those_of_the_whole_picture() {
+        let folder = tempfile::tempdir().unwrap();
+        let scene = scene();
+        let whole = get(&scene, folder.path()).0.image;
+        // 32 pixels are ten squares of 3 and a rest.
+        let fingerprint = Fingerprint::of_reference(&scene, &scene.view, 3);
+        let interrupt = Interrupt::default();
+        let thinned =
+            reference(&scene, 3, &fingerprint, folder.path(), &mut Vec::new(), &Silent, &interrupt).unwrap();
+        assert_eq!((thinned.image.width, thinned.image.height), (10, 10));
+        assert_eq!(thinned.image, whole.thinned(3));
+        assert_eq!(thinned.image.rgba[11], whole.rgba[4 * 32 + 4]);
+        assert_ne!(thinned.image, whole.thinned(2));
+    }
+
+    #[test]
     fn a_damaged_file_is_computed_again() {
         let folder = tempfile::tempdir().unwrap();
         let scene = scene();

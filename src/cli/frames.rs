@@ -87,12 +87,16 @@ struct Queue<'a> {
     pictures: Option<(&'a Names, Marker)>,
     overwrite: bool,
     up_to_date: Vec<u32>,
+    interrupt: &'a Interrupt,
 }
 
 impl Queue<'_> {
     /// The next that is not up to date.
     fn next(&mut self, sequence: &Sequence) -> Option<Result<Wanted>> {
         while let Some(&frame) = self.frames.get(self.next) {
+            if let Err(error) = self.interrupt.check() {
+                return Some(Err(error));
+            }
             self.next += 1;
             let wanted = |mark| Wanted { index: self.next - 1, frame, mark };
             let Some((names, marker)) = &mut self.pictures else { return Some(Ok(wanted(None))) };
@@ -128,6 +132,7 @@ impl Stage {
         next: Option<u32>,
         size: Option<[u32; 2]>,
         progress: &dyn Progress,
+        interrupt: &Interrupt,
     ) -> Result<Drawn> {
         let admit = |sizes: &Sizes| match &self.opened {
             Some(opened) => opened.admit(&Sizes { picture: size.unwrap_or(sizes.picture), ..*sizes }),
@@ -139,13 +144,14 @@ impl Stage {
         };
         let Loaded { mut scene, backdrop, mut stages } = loaded?;
         [scene.view.width, scene.view.height] = size.unwrap_or([scene.view.width, scene.view.height]);
-        if let Some((last, image, report)) = &self.last
-            && scene.skips.allow(Skip::Kept)
-            && scene.shows_the_same(last)
+        // Taken, so that the scene before is gone while the next one is made.
+        if let Some((last, image, report)) =
+            self.last.take().filter(|(last, ..)| scene.skips.allow(Skip::Kept) && scene.shows_the_same(last))
         {
             let skipped = vec!["the picture is kept: nothing differs from the frame before".to_owned()];
-            let report = Report { stages, skipped, ..report.clone() };
-            return Ok(Drawn { image: image.clone(), backdrop, report });
+            let told = Report { stages, skipped, ..report.clone() };
+            self.last = Some((last, image.clone(), report));
+            return Ok(Drawn { image, backdrop, report: told });
         }
         let view = scene.view;
         let scene = Arc::new(scene);
@@ -166,7 +172,8 @@ impl Stage {
         };
         stages.extend(watch.finish());
         let (drawn, ahead) = thread::scope(|scope| {
-            let ahead = next.map(|next| scope.spawn(move || (next, sequence.at(next, &Silent, &|_| Ok(())))));
+            let ahead = next
+                .map(|next| scope.spawn(move || (next, sequence.at(next, &Silent, &|_| interrupt.check()))));
             let drawn = method.render(&view);
             (drawn, ahead.map(|ahead| ahead.join().expect("the making of scenes does not panic")))
         });
@@ -274,8 +281,14 @@ fn render(arguments: &Arguments, line: &Arc<FrameLine>, interrupt: &Interrupt) -
         }
         Output::Film(..) => None,
     };
-    let mut queue =
-        Queue { frames: &frames, next: 0, pictures, overwrite: arguments.overwrite, up_to_date: Vec::new() };
+    let mut queue = Queue {
+        frames: &frames,
+        next: 0,
+        pictures,
+        overwrite: arguments.overwrite,
+        up_to_date: Vec::new(),
+        interrupt,
+    };
     let mut stage = Stage { opened: Some(opened), method: None, ahead: None, last: None };
 
     let mut done = Rendered {
@@ -287,6 +300,7 @@ fn render(arguments: &Arguments, line: &Arc<FrameLine>, interrupt: &Interrupt) -
     };
     let mut film: Option<Film> = None;
     let begun = Instant::now();
+    line.0.stage("looking which frames are up to date");
     let mut coming = queue.next(&sequence);
     while let Some(wanted) = coming {
         let Wanted { index, frame, mark } = wanted?;
@@ -303,7 +317,7 @@ fn render(arguments: &Arguments, line: &Arc<FrameLine>, interrupt: &Interrupt) -
         coming = queue.next(&sequence);
         let next = coming.as_ref().and_then(|wanted| wanted.as_ref().ok()).map(|wanted| wanted.frame);
         let Drawn { image, backdrop, mut report } = stage
-            .render(&mut sequence, frame, next, arguments.pixels(), progress.as_ref())
+            .render(&mut sequence, frame, next, arguments.pixels(), progress.as_ref(), interrupt)
             .map_err(of_frame)?;
         let mut watch = Stopwatch::start();
         let path = match &output {
@@ -337,7 +351,7 @@ fn render(arguments: &Arguments, line: &Arc<FrameLine>, interrupt: &Interrupt) -
         done.up_to_date = queue.up_to_date.len();
         let kept = |&frame: &u32| RenderedFrame { frame, output: names.of(frame), report: None };
         done.frames.extend(queue.up_to_date.iter().map(kept));
-        done.frames.sort_by_key(|one| frames.iter().position(|&frame| frame == one.frame));
+        done.frames.sort_by_key(|one| one.frame);
     }
     Ok(done)
 }

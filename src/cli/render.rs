@@ -202,7 +202,6 @@ fn render(arguments: &Arguments, line: &Arc<Line>, interrupt: &Interrupt, talk: 
     let mut frame = method.render(&view)?;
     frame.report.warnings.extend(warning);
     drop(method);
-    let savings = arguments.explain.then(|| method::savings(entry, &loaded, &setup)).transpose()?;
     check_messages(messages.as_ref())?;
 
     let mut watch = Stopwatch::start();
@@ -216,6 +215,7 @@ fn render(arguments: &Arguments, line: &Arc<Line>, interrupt: &Interrupt, talk: 
     stages.append(&mut frame.report.stages);
     stages.extend(watch.finish());
     frame.report.stages = stages;
+    let savings = plan.as_ref().map(|plan| method::savings(entry, plan, &loaded, &setup)).transpose()?;
     let View { width, height, .. } = view;
     Ok(Rendered {
         scene: scene.clone(),

@@ -18,6 +18,7 @@ impl Image {
     }
 
     /// One pixel of every square of `every` by `every`, the one at `every / 2` on each axis; incomplete squares are left out.
+    /// `every`: at least 1.
     #[must_use]
     pub fn thinned(&self, every: u32) -> Self {
         let (width, height) = (self.width / every, self.height / every);

@@ -5,11 +5,10 @@ use std::time::Instant;
 
 use serde::Serialize;
 
-use super::{Entry, Setup};
-use crate::frame::Frame;
+use super::{Choice, Entry, Setup};
 use crate::progress::{Progress, Silent};
 use crate::scene::{Scene, Skip, Skips};
-use crate::{Result, metric};
+use crate::{Error, Result, metric};
 
 /// Frames that are timed of each, after a first one that is not: the fastest counts.
 const FRAMES: usize = 3;
@@ -19,7 +18,7 @@ const FRAMES: usize = 3;
 pub struct Saving {
     /// What was left out.
     pub skip: Skip,
-    /// A frame that leaves it out, from an eye that stays where it was; wall time in milliseconds.
+    /// The time of a frame that leaves it out, from an eye that stays where it was, in milliseconds.
     pub with: f64,
     /// The same frame with nothing but this not left out.
     pub without: f64,
@@ -27,40 +26,40 @@ pub struct Saving {
     pub difference: f64,
 }
 
-/// Draws the scene's own view with everything left out that `scene.skips` allows, and again without each of those that the plan says are
+/// Draws the scene's own view with everything left out that `scene.skips` allows, and again without each of those that `plan` says are
 /// on, a few times each.
 ///
 /// # Errors
 /// As [`Method::render`](super::Method::render).
-pub fn savings(entry: &Entry, scene: &Scene, setup: &Setup<'_>) -> Result<Vec<Saving>> {
+pub fn savings(entry: &Entry, plan: &[Choice], scene: &Scene, setup: &Setup<'_>) -> Result<Vec<Saving>> {
+    let is_on = |skip: &Skip| plan.iter().any(|choice| choice.about == skip.name() && choice.chosen == "on");
+    let on: Vec<Skip> = Skip::ALL.into_iter().filter(is_on).collect();
+    if on.is_empty() {
+        return Ok(Vec::new());
+    }
     let silent: Arc<dyn Progress> = Arc::new(Silent);
     let setup_of_frames = Setup { progress: &silent, ..*setup };
     let draw = |skips: Skips| {
         let scene = Arc::new(Scene { skips, ..scene.clone() });
         let mut method = entry.prepare(scene.clone(), &setup_of_frames)?;
-        let is_on = {
-            let plan = method.plan();
-            move |skip: Skip| plan.iter().any(|choice| choice.about == skip.name() && choice.chosen == "on")
-        };
-        let frame = method.render(&scene.view)?;
+        let mut frame = method.render(&scene.view)?;
         let mut fastest = f64::INFINITY;
         for _ in 0..FRAMES {
             let start = Instant::now();
-            method.render(&scene.view)?;
+            frame = method.render(&scene.view)?;
             fastest = fastest.min(1e3 * start.elapsed().as_secs_f64());
         }
-        Ok::<_, crate::Error>((frame, fastest, is_on))
+        Ok::<_, Error>((frame, fastest))
     };
     setup.progress.stage("measuring what was saved");
-    let (frame, with, is_on): (Frame, f64, _) = draw(scene.skips)?;
-    let on: Vec<Skip> = Skip::ALL.into_iter().filter(|&skip| is_on(skip)).collect();
+    let (frame, with) = draw(scene.skips)?;
     let mut savings = Vec::new();
     for (index, &skip) in on.iter().enumerate() {
         setup.progress.fraction((index + 1) as f64 / (on.len() + 1) as f64);
         setup.interrupt.check()?;
         let off: Vec<Skip> =
             Skip::ALL.into_iter().filter(|&other| other == skip || !scene.skips.allow(other)).collect();
-        let (other, without, _) = draw(Skips::without(&off))?;
+        let (other, without) = draw(Skips::without(&off))?;
         let difference = metric::compare(&frame.image, &other.image)?.max;
         savings.push(Saving { skip, with, without, difference });
     }

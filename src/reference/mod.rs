@@ -198,7 +198,7 @@ pub fn render(scene: &Scene, view: &View, progress: &dyn Progress, interrupt: &I
     render_thinned(scene, view, 1, progress, interrupt)
 }
 
-/// As [`render`], of the pixels alone that [`Image::thinned`] keeps: a smaller picture of as large a view.
+/// As [`render`], of the pixels alone that [`Image::thinned`] keeps: a smaller picture of as large a view. `every`: at least 1.
 ///
 /// # Errors
 /// As [`render`].

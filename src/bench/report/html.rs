@@ -25,7 +25,7 @@ pub fn page(results: &Results, pictures: &[Pictures]) -> String {
         runs = results.sweep.runs,
     );
     for (scene, pictures) in results.scenes.iter().zip(pictures) {
-        section(&mut page, scene, pictures);
+        section(&mut page, scene, pictures, results.sweep.error_every);
     }
     page += &measured_on(environment, &results.sweep.define);
     page + "<section class=\"notes\">\n<h2>How to read it</h2>\n\
@@ -62,11 +62,15 @@ pub fn escape(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 
-fn section(page: &mut String, scene: &SceneResults, pictures: &Pictures) {
+fn section(page: &mut String, scene: &SceneResults, pictures: &Pictures, error_every: u32) {
+    let thinned = match error_every {
+        1 => String::new(),
+        n => format!(" (errors and pictures: one of {n} × {n})"),
+    };
     let reused = if scene.reference_reused { ", from the cache" } else { "" };
     let _ = writeln!(
         page,
-        "<section>\n<h2>{}</h2>\n<p>{} × {} pixels, {} tetrahedra; the reference took {:.1} s{reused}.</p>",
+        "<section>\n<h2>{}</h2>\n<p>{} × {} pixels{thinned}, {} tetrahedra; the reference took {:.1} s{reused}.</p>",
         escape(&scene.name()),
         scene.width,
         scene.height,

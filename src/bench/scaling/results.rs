@@ -38,7 +38,8 @@ pub struct SeriesResults {
     pub points: Vec<Point>,
     /// Of whole frames, and of each stage that all points have.
     pub growth: Vec<Growth>,
-    /// By how many bytes the memory grows for each one more, from the least size to the greatest; where the system tells.
+    /// By how many bytes the memory grows for each one more, from the first size to the last; where the system tells, and the last is
+    /// the larger.
     pub bytes_each: Option<f64>,
 }
 

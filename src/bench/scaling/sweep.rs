@@ -65,7 +65,7 @@ struct SweepFile {
     runs: Runs,
     #[serde(default)]
     define: Vec<String>,
-    series: Vec<SeriesSection>,
+    series: Spanned<Vec<SeriesSection>>,
 }
 
 #[derive(Deserialize)]
@@ -101,7 +101,12 @@ impl Sweep {
     pub fn parse(name: &str, text: String, base_dir: &Path) -> Result<Self> {
         let text = Text::new(name, text, &[])?;
         let SweepFile { runs, define, series } = text.parse_plain()?;
-        let series = series.into_iter().map(|SeriesSection { name, of, scene, define, sizes }| {
+        if series.get_ref().is_empty() {
+            return Err(
+                text.error(series.span(), "there is nothing to measure, expected at least one [[series]]")
+            );
+        }
+        let series = series.into_inner().into_iter().map(|SeriesSection { name, of, scene, define, sizes }| {
             if sizes.get_ref().len() < 2 {
                 let message = "nothing grows in less than two `sizes`, expected a list of lists of \"section.key=value\"";
                 return Err(text.error(sizes.span(), message));
@@ -175,6 +180,11 @@ sizes = [['mesh.segments=8'], ['mesh.segments=16']]
             assert_ne!(text, SWEEP, "{from}");
             assert_underlined(parse(&text).unwrap_err(), spot, part);
         }
+    }
+
+    #[test]
+    fn without_series_there_is_nothing_to_measure() {
+        assert_underlined(parse("series = []").unwrap_err(), "[]", "at least one [[series]]");
     }
 
     #[test]

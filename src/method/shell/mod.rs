@@ -22,7 +22,7 @@ mod update;
 mod volume;
 mod walk;
 
-use std::sync::Arc;
+use std::sync::{Arc, Weak};
 
 pub use constants::ViewConstants;
 use glam::DVec3;
@@ -74,8 +74,8 @@ struct Last {
     view: View,
     vertices: Arc<Vec<DVec3>>,
     sight: Sight,
-    /// And of what, unless that has changed.
-    seen: Option<(Seen, Arc<shell::Shell>)>,
+    /// And of what, unless that has changed; a shell that is no longer needed may go.
+    seen: Option<(Seen, Weak<shell::Shell>)>,
 }
 
 /// In which order each ray meets the tetrahedra.
@@ -209,7 +209,8 @@ impl Method for Shell {
         };
 
         self.interrupt.check()?;
-        let is_same_shell = seen.as_ref().is_some_and(|(_, shell)| Arc::ptr_eq(shell, &self.scene.shell));
+        let is_same_shell =
+            seen.as_ref().is_some_and(|(_, shell)| shell.as_ptr() == Arc::as_ptr(&self.scene.shell));
         let is_uploaded = is_same_shell && self.canvas.is_some();
         let seen = match seen {
             Some((seen, _)) if is_same_shell => seen,
@@ -326,7 +327,7 @@ impl Method for Shell {
         }
         report.counts.insert("pixels_left_to_host".to_owned(), left);
         report.stages = watch.finish();
-        let (vertices, shell) = (self.scene.shell.vertices.clone(), self.scene.shell.clone());
+        let (vertices, shell) = (self.scene.shell.vertices.clone(), Arc::downgrade(&self.scene.shell));
         self.last = Some(Last { view: *view, vertices, sight, seen: Some((seen, shell)) });
         Ok(Frame { image: Image { width: view.width, height: view.height, rgba }, depth, report })
     }
