@@ -10,6 +10,6 @@ mod results;
 mod run;
 mod sweep;
 
-pub use results::{Growth, Point, Results, SeriesResults};
+pub use results::{FRAME, Growth, Point, Results, SCHEMA, SeriesResults};
 pub use run::{Outcome, run};
 pub use sweep::{Measure, Series, Sweep, is_scaling};
