@@ -45,7 +45,8 @@ pub struct Cached {
     pub reused: bool,
 }
 
-/// The reference's picture of the scene's own view, one pixel of every square of `every` by `every`: from `folder`, or computed and kept there.
+/// The reference's picture of the scene's own view, one pixel of every square of `every` by `every`: from `folder`, or computed and
+/// kept there.
 ///
 /// A file that is damaged is computed again, and `warnings` tells so.
 ///

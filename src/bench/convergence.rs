@@ -1,6 +1,8 @@
 //! The order of convergence: the power of the distance between samples with which the error falls, measured as the slope
 //! of log error over log distance (Etiene et al. 2013, who found errors in renderers by it).
 
+use super::fit::slope;
+
 /// Errors (RMSE) below this are rounding, not quadrature. A pixel is a chain of some hundred blends in f32, each of which
 /// rounds by up to 2^-25 of a value of at most 1: as a random walk, `sqrt(300) 2^-25 = 5e-7`; twice that is left out.
 pub const ROUNDING_FLOOR: f64 = 1e-6;
@@ -9,13 +11,8 @@ pub const ROUNDING_FLOOR: f64 = 1e-6;
 /// is above [`ROUNDING_FLOOR`], and how many these are. `None` where they do not make a line.
 pub fn order(points: &[[f64; 2]]) -> Option<(f64, usize)> {
     let above = |[_, error]: &&[f64; 2]| error.is_finite() && *error > ROUNDING_FLOOR;
-    let logs: Vec<[f64; 2]> = points.iter().filter(above).map(|point| point.map(f64::ln)).collect();
-    let count = logs.len() as f64;
-    let mean = [0, 1].map(|axis| logs.iter().map(|log| log[axis]).sum::<f64>() / count);
-    let moment =
-        |axis: usize| logs.iter().map(|log| (log[0] - mean[0]) * (log[axis] - mean[axis])).sum::<f64>();
-    let slope = moment(1) / moment(0);
-    (logs.len() >= 2 && slope.is_finite()).then_some((slope, logs.len()))
+    let points: Vec<[f64; 2]> = points.iter().filter(above).copied().collect();
+    Some((slope(&points)?, points.len()))
 }
 
 #[cfg(test)]

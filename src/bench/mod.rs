@@ -12,6 +12,7 @@ pub mod convergence;
 pub mod environment;
 pub(crate) mod file;
 pub mod fingerprint;
+mod fit;
 pub mod gallery;
 pub mod measure;
 pub mod pareto;

@@ -121,6 +121,17 @@ impl Timing {
     }
 }
 
+/// Adds a run's stages to those of the runs before.
+pub(super) fn add_stages(timings: &mut Vec<StageTiming>, stages: &[Stage]) {
+    for Stage { name, milliseconds } in stages {
+        if !timings.iter().any(|timing| timing.name == *name) {
+            timings.push(StageTiming { name: name.clone(), time: Timing::default() });
+        }
+        let timing = timings.iter_mut().find(|timing| timing.name == *name).expect("just added");
+        timing.time.push(*milliseconds);
+    }
+}
+
 impl Point {
     /// A point without a run yet.
     pub fn new(setting: Setting, metrics: &Metrics) -> Self {
@@ -133,13 +144,7 @@ impl Point {
     /// Adds a run: the wall time of the frame, and the stages of its report.
     pub fn push(&mut self, milliseconds: f64, stages: &[Stage]) {
         self.time.push(milliseconds);
-        for Stage { name, milliseconds } in stages {
-            if !self.stages.iter().any(|stage| stage.name == *name) {
-                self.stages.push(StageTiming { name: name.clone(), time: Timing::default() });
-            }
-            let stage = self.stages.iter_mut().find(|stage| stage.name == *name).expect("just added");
-            stage.time.push(*milliseconds);
-        }
+        add_stages(&mut self.stages, stages);
     }
 
     /// A number of [`error`](Self::error); infinite where it is not finite.

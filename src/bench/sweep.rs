@@ -183,11 +183,7 @@ impl Sweep {
     /// # Errors
     /// [`Error::Input`] for a file that cannot be read, else as [`parse`](Self::parse).
     pub fn load(path: &Path) -> Result<Self> {
-        let text = input::text(path).map_err(|error| {
-            Error::input(path, format!("the sweep file cannot be read: {error}"))
-                .with_help("check the path, or write the sweep that docs/bench.md describes")
-        })?;
-        Self::parse(&path.display().to_string(), text, path.parent().unwrap_or(Path::new("")))
+        read(path, Self::parse)
     }
 
     /// Reads a sweep from a text: `name` is what errors call it, `base_dir` where its scenes' paths start.
@@ -240,6 +236,15 @@ impl Sweep {
         let json = serde_json::to_vec(self).expect("numbers, strings and lists");
         Fingerprint::builder("sweep").bytes(&json).finish()
     }
+}
+
+/// Reads a sweep file of any kind: `parse` is told its name, its text, and where its paths start.
+pub(super) fn read<T>(path: &Path, parse: impl FnOnce(&str, String, &Path) -> Result<T>) -> Result<T> {
+    let text = input::text(path).map_err(|error| {
+        Error::input(path, format!("the sweep file cannot be read: {error}"))
+            .with_help("check the path, or write the sweep that docs/bench.md describes")
+    })?;
+    parse(&path.display().to_string(), text, path.parent().unwrap_or(Path::new("")))
 }
 
 /// Whether a file is meant to be a sweep, not a scene.

@@ -1,4 +1,4 @@
-//! What the process holds in memory, where the system tells: Linux.
+//! What the process holds in memory, where the system tells: Linux, by proc(5).
 
 use std::fs;
 

@@ -3,7 +3,6 @@
 //! A [`Sweep`] has series; each draws one scene at several sizes. How a time `t` grows with a size `n` is told by the slope of
 //! `log t` over `log n`: 1 where twice as much takes twice as long.
 
-mod fit;
 mod memory;
 mod report;
 mod results;

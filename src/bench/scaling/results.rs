@@ -1,12 +1,11 @@
 //! What was measured: `docs/bench.md` describes the JSON file key by key.
 
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
-use super::fit::slope;
 use super::sweep::{Measure, Sweep};
 use crate::bench::Environment;
+use crate::bench::fit::slope;
 use crate::bench::results::{StageTiming, Timing};
-use crate::frame::Stage;
 
 /// Of [`Results`]; another number means that keys have another meaning.
 pub const SCHEMA: u32 = 1;
@@ -44,7 +43,7 @@ pub struct SeriesResults {
 }
 
 /// The scene at one size.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Point {
     /// How many.
     pub size: u64,
@@ -57,7 +56,7 @@ pub struct Point {
 }
 
 /// How a time grows with the size.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Growth {
     /// A stage, or [`FRAME`].
     pub stage: String,
@@ -69,20 +68,6 @@ impl Point {
     /// Without a frame yet.
     pub fn new(size: u64) -> Self {
         Self { size, frame: Timing::default(), stages: Vec::new(), memory: None }
-    }
-
-    /// Adds times of stages.
-    pub fn push(&mut self, stages: &[Stage]) {
-        for Stage { name, milliseconds } in stages {
-            match self.stages.iter_mut().find(|stage| stage.name == *name) {
-                Some(stage) => stage.time.push(*milliseconds),
-                None => {
-                    let mut time = Timing::default();
-                    time.push(*milliseconds);
-                    self.stages.push(StageTiming { name: name.clone(), time });
-                }
-            }
-        }
     }
 
     /// The median, in milliseconds, of a stage or of [`FRAME`].
@@ -100,8 +85,8 @@ impl SeriesResults {
         let stages =
             points.first().into_iter().flat_map(|point| &point.stages).map(|stage| stage.name.as_str());
         let growth = |stage: &str| {
-            let times: Option<Vec<(f64, f64)>> =
-                points.iter().map(|point| Some((point.size as f64, point.milliseconds(stage)?))).collect();
+            let times: Option<Vec<[f64; 2]>> =
+                points.iter().map(|point| Some([point.size as f64, point.milliseconds(stage)?])).collect();
             Some(Growth { stage: stage.to_owned(), slope: slope(&times?)? })
         };
         let growth = [FRAME].into_iter().chain(stages).filter_map(growth).collect();
@@ -118,6 +103,8 @@ impl SeriesResults {
 #[cfg(test)]
 pub mod tests {
     use super::*;
+    use crate::bench::results::add_stages;
+    use crate::frame::Stage;
 
     /// Frames in proportion to the size, a stage with its square root; 100 bytes each.
     pub fn series() -> SeriesResults {
@@ -125,7 +112,8 @@ pub mod tests {
             let mut point = Point::new(size);
             for _ in 0..3 {
                 point.frame.push(0.5 * size as f64);
-                point.push(&[Stage { name: "order".to_owned(), milliseconds: (size as f64).sqrt() }]);
+                let order = Stage { name: "order".to_owned(), milliseconds: (size as f64).sqrt() };
+                add_stages(&mut point.stages, &[order]);
             }
             point.memory = Some(1000 + 100 * size);
             point

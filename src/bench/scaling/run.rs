@@ -9,6 +9,7 @@ use super::report::{csv, html};
 use super::results::{Point, Results, SCHEMA, SeriesResults};
 use super::sweep::{Measure, Series, Sweep};
 use crate::bench::file::{check_writable, write_whole};
+use crate::bench::results::add_stages;
 use crate::bench::{Environment, Options};
 use crate::gpu::Gpu;
 use crate::method::{METHODS, Opened, Setup};
@@ -84,7 +85,7 @@ fn measure(
     let loaded = scene::load_if(&series.scene, overrides, &Silent, &admit)?;
     let scene = Arc::new(loaded.scene);
     let mut point = Point::new(size_of(series.of, &scene));
-    point.push(&loaded.stages);
+    add_stages(&mut point.stages, &loaded.stages);
     let mut method = opened.prepare(scene.clone())?;
     // In the first pipelines are compiled and buffers made.
     let warm_up = method.render(&scene.view)?;
@@ -101,7 +102,7 @@ fn measure(
         let start = Instant::now();
         let frame = method.render(&scene.view)?;
         point.frame.push(1e3 * start.elapsed().as_secs_f64());
-        point.push(&frame.report.stages);
+        add_stages(&mut point.stages, &frame.report.stages);
     }
     Ok(point)
 }

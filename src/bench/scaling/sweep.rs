@@ -5,9 +5,10 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 use toml::Spanned;
 
+use crate::bench::sweep::read;
 use crate::scene::text::Text;
 use crate::value::Runs;
-use crate::{Error, Result, input};
+use crate::{Result, input};
 
 /// What is measured.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -89,9 +90,7 @@ impl Sweep {
     /// # Errors
     /// [`Error::Input`] for a file that cannot be read, else as [`parse`](Self::parse).
     pub fn load(path: &Path) -> Result<Self> {
-        let text = input::text(path)
-            .map_err(|error| Error::input(path, format!("the sweep file cannot be read: {error}")))?;
-        Self::parse(&path.display().to_string(), text, path.parent().unwrap_or(Path::new("")))
+        read(path, Self::parse)
     }
 
     /// Reads a sweep from a text: `name` is what errors call it, `base_dir` where its paths start.
