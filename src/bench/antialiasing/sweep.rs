@@ -65,7 +65,7 @@ impl Sweep {
     /// Reads a sweep file.
     ///
     /// # Errors
-    /// [`Error::Input`] for a file that cannot be read, else as [`parse`](Self::parse).
+    /// [`Error::Input`](crate::Error::Input) for a file that cannot be read, else as [`parse`](Self::parse).
     pub fn load(path: &Path) -> Result<Self> {
         read(path, Self::parse)
     }
@@ -73,7 +73,7 @@ impl Sweep {
     /// Reads a sweep from a text: `name` is what errors call it, `base_dir` where its paths start.
     ///
     /// # Errors
-    /// [`Error::Text`], with the spot.
+    /// [`Error::Text`](crate::Error::Text), with the spot.
     pub fn parse(name: &str, text: String, base_dir: &Path) -> Result<Self> {
         let plans = span_of_section(&text, "plans");
         let text = Text::new(name, text, &[])?;
