@@ -61,7 +61,7 @@ void main() {
                 for (uint hit = first; hit < end; hit++) {
                     if (spans[hit].y <= z) continue;
 #ifdef LIT
-                    enter(hits[hit], cells[hits[hit]].planes, ray);
+                    enter(hits[hit], ray);
 #endif
                     add(sum, radiant(path_in(cells[hits[hit]].texture, ray), at), step * per_depth);
                 }

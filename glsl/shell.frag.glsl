@@ -34,7 +34,7 @@ void main() {
     if (!(segment.y > segment.x)) discard;
 
 #ifdef LIT
-    enter(cell_index, planes, ray);
+    enter(cell_index, ray);
 #endif
     Light light = Light(Gathered(vec4(0.0), vec4(0.0)), 0.0);
     march(path_in(texture_rows, ray), segment, length(ray) * view.per_opacity_distance, light);

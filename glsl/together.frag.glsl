@@ -115,9 +115,7 @@ void main() {
                     vec4 rows[3];
                     texture_of(places[i] >> 2, rows);
 #ifdef LIT
-                    vec4 planes[4];
-                    planes_of(places[i] >> 2, planes);
-                    enter(places[i] >> 2, planes, ray);
+                    enter(places[i] >> 2, ray);
 #endif
                     add(sum, radiant(path_in(rows, ray), at), step * per_depth);
                 }

@@ -87,9 +87,7 @@ void main() {
         }
         if (first < steps.count) {
 #ifdef LIT
-            vec4 planes[4];
-            planes_of(cell, planes);
-            enter(cell, planes, ray);
+            enter(cell, ray);
 #endif
             march_midpoints(path, steps, first, per_depth, light, passes);
         }

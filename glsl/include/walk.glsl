@@ -35,10 +35,6 @@ void texture_of(uint cell, out vec4 rows[3]) {
     for (int i = 0; i < 3; i++) rows[i] = texelFetch(cells, int(cell * 9) + 6 + i);
 }
 
-void planes_of(uint cell, out vec4 planes[4]) {
-    for (int i = 0; i < 4; i++) planes[i] = texelFetch(cells, int(cell * 9) + 2 + i);
-}
-
 // The crossings of this pixel, from `next` to before `last`: none, unless its ray is as intricate as asked. Where several pixels run at
 // once, those that are discarded may run on with the others: without crossings they soon stop.
 void crossings_of_pixel(bool intricate, out int next, out int last, out bool is_begun) {

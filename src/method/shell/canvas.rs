@@ -1,7 +1,7 @@
 //! What a frame of one size and kind needs on the device beside the scene: its target, pipelines and the buffers of what is seen.
 
 use super::constants::{ViewConstants, constants_of_volume};
-use super::lit::{self, Lit, LitView, Sight as LitSight};
+use super::lit::{self, LitView, Sight as LitSight};
 use super::seen::{Run, Seen};
 use super::solids::SolidView;
 use super::walk::{self, RayBuffers, Ways};
@@ -41,11 +41,7 @@ enum Medium {
 
 impl Canvas {
     /// By the binding that shaders name.
-    pub(super) fn buffers<'a>(
-        &'a self,
-        lit: Option<&'a Lit>,
-        ways: Option<&'a Ways>,
-    ) -> Vec<(u32, &'a Buffer)> {
+    pub(super) fn buffers<'a>(&'a self, ways: Option<&'a Ways>) -> Vec<(u32, &'a Buffer)> {
         let mut buffers = Vec::new();
         match &self.medium {
             Medium::Sorted { tiles, list, .. } => buffers.extend([(0, &self.cells), (1, tiles), (2, list)]),
@@ -55,8 +51,8 @@ impl Canvas {
                 buffers.extend(ways.map(|ways| (19, ways.beyond())));
             }
         }
-        if let (Some(lit), Some(view)) = (lit, &self.lit) {
-            buffers.extend([(3, &view.cells), (4, &lit.frames)]);
+        if let Some(view) = &self.lit {
+            buffers.push((3, &view.frames));
             buffers.extend(view.lights());
         }
         buffers
@@ -181,7 +177,7 @@ impl Shell {
         for &switch in on {
             let (more_uniform_buffers, more_texel_buffers, more_textures): (&[u32], &[u32], &[u32]) =
                 match switch {
-                    "LIT" => (&[5], &[3, 4], &[9]),
+                    "LIT" => (&[5], &[3], &[9]),
                     "SHADOWS" => (&[6], &[], &[10, 11, 12, 13]),
                     "SOLIDS" => (&[], &[], &[15]),
                     "SPARSE" => (&[], &[], &[22]),

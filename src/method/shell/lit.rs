@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use bytemuck::{Pod, Zeroable};
-use glam::DVec3;
+use glam::{DMat3, DVec4};
 use rayon::prelude::*;
 
 use super::seen::Seen;
@@ -14,21 +14,12 @@ use crate::scene::shading::MOST_LIGHTS;
 use crate::scene::{Light, Shading, Source, View};
 use crate::shell::{self, Shell};
 
-/// A frame of `glsl/include/frame.glsl`: see there.
-#[derive(Debug, Clone, Copy, Pod, Zeroable)]
-#[repr(C)]
-#[allow(missing_docs, reason = "documented at the one declaration in glsl")]
-pub struct Frame {
-    pub columns: [[f32; 4]; 3],
-}
-
 /// What `glsl/include/frame.glsl` needs of a tetrahedron: see there.
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
 #[allow(missing_docs, reason = "documented at the one declaration in glsl")]
-pub struct LitCell {
-    pub frames: [u32; 4],
-    pub per_height: [f32; 4],
+pub struct Frame {
+    pub entries: [[f32; 4]; 9],
 }
 
 /// `Lighting` of `glsl/include/lights.glsl`, before its [`MOST_LIGHTS`] sources: see there for each member.
@@ -71,16 +62,14 @@ pub fn constants<'a>(lights: impl Iterator<Item = &'a Light>, shadows: Option<&S
 pub struct Lit {
     /// Normals or tangents.
     pub directions: Texture3d,
-    /// [`Frame`]s.
-    pub frames: Buffer,
-    /// Of the four vertices of each tetrahedron.
-    of_vertices: Vec<[u32; 4]>,
+    /// The shell's, at vertices.
+    frames: shell::Frames,
 }
 
 /// What depends on it.
 pub struct LitView {
-    /// [`LitCell`]s, one a tetrahedron.
-    pub cells: Buffer,
+    /// [`Frame`]s, one a tetrahedron.
+    pub frames: Buffer,
     /// [`Lighting`] and its [`LightSource`]s.
     pub lighting: Buffer,
     /// [`LightPicture`]s, where a light casts shadows.
@@ -105,43 +94,46 @@ pub struct Sight<'a> {
 }
 
 impl Lit {
-    /// Uploads directions and frames.
+    /// Uploads directions.
     ///
     /// # Errors
     /// [`Error::OutOfMemory`](crate::Error::OutOfMemory); [`Error::Device`](crate::Error::Device) where the device's
     /// buffers are too small.
     pub fn new(gpu: &Arc<Gpu>, shell: &Shell, shading: &Shading) -> Result<Self> {
         let directions = Texture3d::upload_directions(gpu, "the directions", &shading.directions)?;
-        let (frames, of_vertices) = frames(shell, shading);
-        Ok(Self { directions, frames: Buffer::floats(gpu, "the shell's frames", &frames)?, of_vertices })
+        Ok(Self { directions, frames: shell.frames(shading.model.frame_kind()) })
     }
 
     /// The same directions in another shell.
-    ///
-    /// # Errors
-    /// As [`Lit::new`].
-    pub fn place(&mut self, shell: &Shell, shading: &Shading) -> Result<()> {
-        let (frames, of_vertices) = frames(shell, shading);
-        self.frames.refill(&frames)?;
-        self.of_vertices = of_vertices;
-        Ok(())
+    pub fn place(&mut self, shell: &Shell, shading: &Shading) {
+        self.frames = shell.frames(shading.model.frame_kind());
     }
 
-    fn cells(&self, shell: &Shell, seen: &Seen) -> Vec<LitCell> {
-        let cell = |(cell, &frames): (&shell::Cell, &[u32; 4])| {
-            let per_height = cell.gradients.map(|gradient| (gradient.length() * seen.unit) as f32);
-            LitCell { frames, per_height }
+    /// The frame of each tetrahedron, as a function of the point in view space. Barycentric coordinates are affine in it, and vertices'
+    /// maps are blended by them.
+    fn frames(&self, sight: Sight<'_>) -> Vec<Frame> {
+        let Sight { shell, seen, view, .. } = sight;
+        let camera = view.camera.frame();
+        let view_from_world =
+            DMat3::from_cols(camera.right, camera.up, camera.forward).transpose() * seen.unit;
+        let frame = |(t, (cell, of_vertices)): (usize, (&shell::Cell, &[u32; 4]))| {
+            if !shell.has_maps(t) {
+                return Frame::zeroed();
+            }
+            let vertices = shell.vertices_of(t);
+            let mut entries = [DVec4::ZERO; 9];
+            for k in 0..4 {
+                let at_eye = 1.0 + cell.gradients[k].dot(view.camera.eye - vertices[k]);
+                let barycentric = (view_from_world * cell.gradients[k]).extend(at_eye);
+                let map = self.frames.maps[of_vertices[k] as usize].to_cols_array();
+                for (entry, at_vertex) in entries.iter_mut().zip(map) {
+                    *entry += barycentric * at_vertex;
+                }
+            }
+            Frame { entries: entries.map(|entry| entry.as_vec4().to_array()) }
         };
-        shell.cells().par_iter().zip(&self.of_vertices).map(cell).collect()
+        shell.cells().par_iter().zip(&self.frames.of_vertices).enumerate().map(frame).collect()
     }
-}
-
-/// The frames of a shell, and which of them each tetrahedron's vertices have.
-fn frames(shell: &Shell, shading: &Shading) -> (Vec<Frame>, Vec<[u32; 4]>) {
-    let shell::Frames { maps, of_vertices } = shell.frames(shading.model.frame_kind());
-    let column = |column: DVec3| column.as_vec3().extend(0.0).to_array();
-    let frame = |map: &glam::DMat3| Frame { columns: [map.x_axis, map.y_axis, map.z_axis].map(column) };
-    (maps.iter().map(frame).collect(), of_vertices)
 }
 
 impl LitView {
@@ -153,19 +145,19 @@ impl LitView {
         let pictures = sight.pictures();
         let pictures = pictures.map(|pictures| Buffer::uniform(gpu, "the lights' pictures", &pictures));
         Ok(Self {
-            cells: Buffer::floats(gpu, "the tetrahedra's frames", &lit.cells(sight.shell, sight.seen))?,
+            frames: Buffer::floats(gpu, "the tetrahedra's frames", &lit.frames(sight))?,
             lighting: Buffer::uniform(gpu, "the lights", &sight.lighting())?,
             pictures: pictures.transpose()?,
         })
     }
 
-    /// The same into the buffers that there are; the cells where they are others than before.
+    /// The same into the buffers that there are; the frames where they are others than before.
     ///
     /// # Errors
     /// As [`Lit::new`].
-    pub fn refill(&mut self, lit: &Lit, sight: Sight<'_>, cells: bool) -> Result<()> {
-        if cells {
-            self.cells.refill(&lit.cells(sight.shell, sight.seen))?;
+    pub fn refill(&mut self, lit: &Lit, sight: Sight<'_>, frames: bool) -> Result<()> {
+        if frames {
+            self.frames.refill(&lit.frames(sight))?;
         }
         if let (Some(buffer), Some(pictures)) = (&mut self.pictures, sight.pictures()) {
             buffer.refill(&pictures)?;

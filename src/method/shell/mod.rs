@@ -284,7 +284,7 @@ impl Method for Shell {
         let times = draw(&Draw {
             target: &canvas.target,
             clears: true,
-            buffers: &canvas.buffers(self.lit.as_ref(), self.ways.as_ref()),
+            buffers: &canvas.buffers(self.ways.as_ref()),
             textures: &textures,
             push_constants: bytemuck::bytes_of(&constants),
             batches: &batches,

@@ -51,7 +51,7 @@ impl Shell {
         if let (Some(lit), Some(shading), true, false) =
             (&mut self.lit, &scene.shading, same_directions, same_shell)
         {
-            lit.place(&scene.shell, shading)?;
+            lit.place(&scene.shell, shading);
         }
 
         // Nothing fails from here on.
