@@ -7,7 +7,8 @@ use std::path::{Path, PathBuf};
 use common::Watched;
 use mesoshell::metric;
 use mesoshell::order::{self, Check, Sorter};
-use mesoshell::progress::Silent;
+use mesoshell::progress::{Interrupt, Silent};
+use mesoshell::reference;
 use mesoshell::scene::{Scene, Sequence};
 use std::sync::Arc;
 
@@ -55,6 +56,9 @@ fn no_frame_has_a_violation_of_its_order() {
     }
 }
 
+/// Of one pixel in so many, both ways, the reference is asked: some 25,000 of a frame.
+const EVERY: u32 = 2;
+
 /// At the scene's own size and quality, within the bounds of still scenes (`tests/accuracy.rs`).
 #[test]
 fn frames_look_as_the_reference_does() {
@@ -72,8 +76,10 @@ fn frames_look_as_the_reference_does() {
                 }
                 None => shell.insert(Watched::prepare("shell", &scene)),
             };
-            let drawn = method.render(&view).image;
-            let reference = Watched::prepare("reference", &scene).render(&view).image;
+            let drawn = method.render(&view).image.thinned(EVERY);
+            let reference = reference::render_thinned(&scene, &view, EVERY, &Silent, &Interrupt::default())
+                .unwrap()
+                .image;
             let metrics = metric::compare(&drawn, &reference).unwrap();
             println!("{} frame {frame}: {metrics:?}", path.display());
             assert!(metrics.rmse <= 1e-3 && metrics.p999 <= 1e-2, "{} {frame}: {metrics:?}", path.display());
