@@ -6,7 +6,7 @@
 //!     v y
 //! ```
 
-use glam::{DVec2, DVec3};
+use glam::{DMat3, DVec2, DVec3};
 
 /// The vertical field of view where nothing else is said, in degrees.
 pub const DEFAULT_FOV_DEGREES: f64 = 40.0;
@@ -38,6 +38,13 @@ pub struct CameraFrame {
     pub up: DVec3,
     /// Into the picture.
     pub forward: DVec3,
+}
+
+impl CameraFrame {
+    /// View space, whose axes are right, up and forward, from world space: the frame's vectors as rows.
+    pub fn view_from_world(&self) -> DMat3 {
+        DMat3::from_cols(self.right, self.up, self.forward).transpose()
+    }
 }
 
 /// A camera with the picture that it takes.

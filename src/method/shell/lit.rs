@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use bytemuck::{Pod, Zeroable};
-use glam::{DMat3, DVec4};
+use glam::DVec4;
 use rayon::prelude::*;
 
 use super::seen::Seen;
@@ -113,9 +113,7 @@ impl Lit {
     /// maps are blended by them.
     fn frames(&self, sight: Sight<'_>) -> Vec<Frame> {
         let Sight { shell, seen, view, .. } = sight;
-        let camera = view.camera.frame();
-        let view_from_world =
-            DMat3::from_cols(camera.right, camera.up, camera.forward).transpose() * seen.unit;
+        let view_from_world = view.camera.frame().view_from_world() * seen.unit;
         let frame = |(t, (cell, of_vertices)): (usize, (&shell::Cell, &[u32; 4]))| {
             if !shell.has_maps(t) {
                 return Frame::zeroed();

@@ -242,7 +242,6 @@ struct Vertex {
 
 impl<'a> Eye<'a> {
     fn new(scene: &'a Scene, view: &View, subpixels: u32) -> Self {
-        let frame = view.camera.frame();
         let projection = Projection {
             centre: 0.5 * DVec2::new(f64::from(view.width), f64::from(view.height)),
             pixel: view.pixel_at_unit_depth(),
@@ -252,7 +251,7 @@ impl<'a> Eye<'a> {
             margin: 2.0 / f64::from(subpixels),
         };
         let eye = view.camera.eye;
-        let view_from_world = DMat3::from_cols(frame.right, frame.up, frame.forward).transpose();
+        let view_from_world = view.camera.frame().view_from_world();
         let vertex = |&vertex: &DVec3| {
             let position = view_from_world * (vertex - eye);
             Vertex { position, pixel: projection.project(position) }

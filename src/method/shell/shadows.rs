@@ -378,14 +378,9 @@ fn in_its_unit(view: &LightView) -> f64 {
     if view.is_parallel { view.pixel / view.far } else { view.pixel }
 }
 
-/// Light space from world space: its rows are right, up and forward.
-fn axes(view: &LightView) -> DMat3 {
-    DMat3::from_cols(view.frame.right, view.frame.up, view.frame.forward).transpose()
-}
-
 /// `None` where the light sees the triangle edge-on.
 fn blocker(view: &LightView, corners: [DVec3; 3], picture: u32) -> Option<Blocker> {
-    let [a, b, c] = corners.map(|corner| axes(view) * (corner - view.origin) / view.far);
+    let [a, b, c] = corners.map(|corner| view.frame.view_from_world() * (corner - view.origin) / view.far);
     let normal = (b - a).cross(c - a).normalize_or_zero();
     let height = normal.dot(a);
     let pixel = in_its_unit(view);
@@ -421,7 +416,7 @@ struct Lens<'a> {
 
 impl<'a> Lens<'a> {
     fn new(view: &'a LightView, side: u32) -> Self {
-        Self { view, light_from_world: axes(view), side: f64::from(side) }
+        Self { view, light_from_world: view.frame.view_from_world(), side: f64::from(side) }
     }
 
     /// A tetrahedron, where it is, and whether more than level 0 can be needed in it; `None` where none of it is seen.

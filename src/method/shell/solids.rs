@@ -163,8 +163,7 @@ struct Eye {
 
 impl Eye {
     fn new(view: &View, unit: f64, bias: f64) -> Self {
-        let frame = view.camera.frame();
-        let view_from_world = DMat3::from_cols(frame.right, frame.up, frame.forward).transpose();
+        let view_from_world = view.camera.frame().view_from_world();
         Self { position: view.camera.eye, view_from_world, unit, bias }
     }
 
