@@ -5,14 +5,14 @@ layout(constant_id = 5) const bool INSIDE = false; // whether rays begin in the 
 
 layout(set = 0, binding = 18) uniform samplerBuffer cells;    // of src/method/shell/seen.rs, nine texels each
 layout(set = 0, binding = 19) uniform usamplerBuffer beyond;  // four a tetrahedron: the place beyond each face, or NOWHERE
-layout(set = 0, binding = 20) uniform usamplerBuffer firsts;  // of each pixel, row by row, in `crossings`; and after the last
+layout(set = 0, binding = 20) uniform usamplerBuffer of_pixels; // each pixel's range of `crossings`, row by row
 layout(set = 0, binding = 21) uniform usamplerBuffer crossings; // places where rays enter the shell and leave it, front to back
 
 // A place is four times a tetrahedron and the number of its face.
 const uint NOWHERE = 0xffffffffu;
 // In `crossings`: here the ray leaves the shell; else it enters it.
 const uint LEAVES = 0x80000000u;
-// In `firsts`: the ray is in two parts of the shell at once; it begins in the shell.
+// In the first number of `of_pixels`: the ray is in two parts of the shell at once; it begins in the shell.
 const uint INTRICATE = 0x80000000u;
 const uint BEGUN = 0x40000000u;
 
@@ -39,11 +39,11 @@ void texture_of(uint cell, out vec4 rows[3]) {
 // once, those that are discarded may run on with the others: without crossings they soon stop.
 void crossings_of_pixel(bool intricate, out int next, out int last, out bool is_begun) {
     int pixel = int(gl_FragCoord.y) * int(2.0 * view.centre.x) + int(gl_FragCoord.x);
-    uint begin = texelFetch(firsts, pixel).x;
-    next = int(begin & ~(INTRICATE | BEGUN));
-    last = int(texelFetch(firsts, pixel + 1).x & ~(INTRICATE | BEGUN));
-    is_begun = INSIDE && (begin & BEGUN) != 0;
-    if (((begin & INTRICATE) != 0) != intricate) last = next;
+    uvec2 range = texelFetch(of_pixels, pixel).xy;
+    next = int(range.x & ~(INTRICATE | BEGUN));
+    last = int(range.y);
+    is_begun = INSIDE && (range.x & BEGUN) != 0;
+    if (((range.x & INTRICATE) != 0) != intricate) last = next;
 }
 
 // Parts of the shell may touch at faces that know nothing of one another, and rays may lie in the planes of those. Then f32 takes

@@ -71,10 +71,22 @@ impl Buffer {
         Self::filled(gpu, name, Kind::Texels(vk::Format::R32_UINT), bytemuck::cast_slice(data))
     }
 
+    /// Texels of two unsigned numbers each that shaders fetch.
+    ///
+    /// # Errors
+    /// As [`Buffer::floats`].
+    pub fn pairs(gpu: &Arc<Gpu>, name: &'static str, data: &[[u32; 2]]) -> Result<Self> {
+        Self::filled(gpu, name, Kind::Texels(vk::Format::R32G32_UINT), bytemuck::cast_slice(data))
+    }
+
     fn filled(gpu: &Arc<Gpu>, name: &'static str, kind: Kind, data: &[u8]) -> Result<Self> {
         let (bytes, limit) = match kind {
             Kind::Texels(format) => {
-                let texel = if format == vk::Format::R32_UINT { 4 } else { 16 };
+                let texel = match format {
+                    vk::Format::R32_UINT => 4,
+                    vk::Format::R32G32_UINT => 8,
+                    _ => 16,
+                };
                 (data.len().max(texel), u64::from(gpu.limits.max_texel_buffer_elements) * texel as u64)
             }
             Kind::Uniform => (data.len().max(4), u64::from(gpu.limits.max_uniform_buffer_range)),

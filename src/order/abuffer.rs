@@ -7,9 +7,12 @@
 //!   in front of the eye are met (the near plane plays no part);
 //! - samples stand 1e-10 pixels off the pixel centres: a symmetric scene sends rays exactly through edges and
 //!   vertices, where rounding would decide on its own which faces are met, and in which order.
+//! - what a pixel's ray crosses is found once for all pixels of a row beside one another whose rays cross the same faces in the same
+//!   order, not pixel by pixel.
 //!
 //! Inverse depth is used for depth: it is linear in pixel coordinates over a plane.
 
+use std::cmp::Ordering;
 use std::ops::Range;
 
 use glam::DVec3;
@@ -18,7 +21,7 @@ use rayon::prelude::*;
 use super::relations::BoundaryFace;
 use crate::scene::View;
 
-/// Rows of pixels that are worked on together: few enough that their fragments stay in the cache.
+/// Rows of pixels that are worked on together: few enough that their spans stay in the cache.
 const BAND: usize = 16;
 
 /// Pixels right and down from a pixel's centre to its sample. Far above the rounding of projected vertices
@@ -26,11 +29,11 @@ const BAND: usize = 16;
 /// far below any distance that matters: what a ray cuts off by less than this is thinner than 1e-10 pixels.
 const NUDGE: [f64; 2] = [1e-10, 0.6180339887e-10];
 
-/// Pixels by which bounds are widened before pixels are tested one by one: above the rounding of a
-/// projected coordinate and above [`NUDGE`], and small enough to cost nothing.
+/// Pixels by which a sample is off a bound, at least, where it need not be tested: above the rounding of a
+/// projected coordinate and above [`NUDGE`], and small enough that few samples are.
 const MARGIN: f64 = 1e-6;
 
-/// End of a list of fragments.
+/// End of a list of spans.
 const NONE: u32 = u32::MAX;
 
 /// A linear function of pixel coordinates that are measured from the image's middle.
@@ -72,12 +75,12 @@ impl Raster {
         y as f64 + 0.5 - 0.5 * self.height as f64 + NUDGE[1]
     }
 
-    /// The indices, of `size` along one axis, whose samples lie in `low..=high`, with a margin.
-    fn indices(low: f64, high: f64, size: usize) -> Range<u32> {
+    /// The indices, of `size` along one axis, whose samples lie in `low..=high`, where each end is off by `margin` to the outside.
+    fn indices(low: f64, high: f64, margin: f64, size: usize) -> Range<u32> {
         let first = 0.5 * size as f64 - 0.5;
         // Casts round towards zero, saturate, and are one instruction; floor and ceil are calls.
-        let begin = (low + first - MARGIN + 1.0).min(size as f64) as u32;
-        let end = (high + first + MARGIN + 1.0).min(size as f64) as u32;
+        let begin = (low + first - margin + 1.0).min(size as f64) as u32;
+        let end = (high + first + margin + 1.0).min(size as f64) as u32;
         begin..end
     }
 }
@@ -89,6 +92,8 @@ struct Footprint {
     edges: [Line; 3],
     /// For each edge `-1 / x`: times the rest of the function it is the column where the edge is crossed.
     edge_columns: [f64; 3],
+    /// Whether an edge runs along the rows, and is crossed nowhere.
+    is_level: bool,
     /// Inverse depth, in front of the eye inside.
     inverse_depth: Line,
     columns: Range<u32>,
@@ -128,8 +133,8 @@ impl Footprint {
         let pixel = raster.pixel;
         let (left, right) = projected_range(&corners, 0, pixel);
         let (top, bottom) = projected_range(&corners, 1, pixel);
-        let columns = Raster::indices(left, right, raster.width);
-        let rows = Raster::indices(top, bottom, raster.height);
+        let columns = Raster::indices(left, right, MARGIN, raster.width);
+        let rows = Raster::indices(top, bottom, MARGIN, raster.height);
         if columns.is_empty() || rows.is_empty() {
             return None;
         }
@@ -144,7 +149,8 @@ impl Footprint {
         let edges = [q.cross(r), r.cross(p), p.cross(q)].map(|normal| Line::new(normal, pixel, eye_side));
         let inverse_depth = Line::new(normal, pixel, distance.recip());
         let edge_columns = edges.map(|edge| -edge.x.recip());
-        Some(Self { edges, edge_columns, inverse_depth, columns, rows, crossing: Crossing::new(face) })
+        let is_level = edges.iter().any(|edge| edge.x == 0.0);
+        Some(Self { edges, edge_columns, is_level, inverse_depth, columns, rows, crossing: Crossing::new(face) })
     }
 
     /// The columns of row `y` that are covered.
@@ -157,10 +163,16 @@ impl Footprint {
             low = if edge.x > 0.0 { low.max(crossing) } else { low };
             high = if edge.x < 0.0 { high.min(crossing) } else { high };
         }
-        let span = Raster::indices(low, high, raster.width);
-        let mut start = span.start.max(self.columns.start) as usize;
-        let mut end = (span.end.min(self.columns.end) as usize).max(start);
-        // The crossings are rounded; the edge functions decide. Each is monotonic in the column even as
+        let clamped = |span: Range<u32>| {
+            let start = span.start.max(self.columns.start) as usize;
+            start..(span.end.min(self.columns.end) as usize).max(start)
+        };
+        let span = clamped(Raster::indices(low, high, MARGIN, raster.width));
+        if !self.is_level && span == clamped(Raster::indices(low, high, -MARGIN, raster.width)) {
+            return span;
+        }
+        let Range { mut start, mut end } = span;
+        // A sample is so near to a crossing that the edge functions decide. Each is monotonic in the column even as
         // rounded, so what is covered is an interval, and only its ends need to be tried.
         let covers = |x: usize| {
             let column = raster.column(x);
@@ -206,13 +218,30 @@ impl Crossing {
     }
 }
 
-/// Where a ray meets a face.
+/// The pixels of a row that a face covers.
 #[derive(Debug, Clone, Copy)]
-struct Fragment {
-    inverse_depth: f64,
+struct Span {
+    /// The inverse depth at column `x` is `slope * raster.column(x) + at_row`.
+    slope: f64,
+    at_row: f64,
     crossing: Crossing,
-    /// The next fragment of the pixel, or [`NONE`].
+    /// After its last column.
+    end: u32,
+    /// The next span that begins where this one does, or [`NONE`].
     next: u32,
+}
+
+impl Span {
+    fn inverse_depth(&self, column: f64) -> f64 {
+        self.slope * column + self.at_row
+    }
+
+    /// By depth; faces in the same place (equal to the last bit, since the order of a face's vertices is canonical) by leaves before
+    /// entries, then by id.
+    fn compare(&self, other: &Self, column: f64) -> Ordering {
+        let nearer = other.inverse_depth(column).total_cmp(&self.inverse_depth(column));
+        nearer.then(self.crossing.cmp(&other.crossing))
+    }
 }
 
 /// The boundary faces of a shell in a view, by the bands of rows that they reach into.
@@ -223,13 +252,14 @@ pub(super) struct ABuffer {
     bands: Vec<Vec<u32>>,
 }
 
-/// The crossings of one band's pixels; its memory is used again for the next.
+/// The spans of one band of rows; its memory is used again for the next.
 pub(super) struct Band {
-    /// First fragment of each pixel of the band.
-    heads: Vec<u32>,
-    fragments: Vec<Fragment>,
-    /// The fragments of one pixel, and their crossings.
-    list: Vec<Fragment>,
+    raster: Raster,
+    /// The first span that begins at each pixel, or [`NONE`].
+    begins: Vec<u32>,
+    spans: Vec<Span>,
+    /// Those over one pixel, front to back, and their crossings.
+    here: Vec<Span>,
     crossings: Vec<Crossing>,
 }
 
@@ -264,9 +294,10 @@ impl ABuffer {
         visit: impl Fn(&mut S, &mut Band) -> T + Sync + Send,
     ) -> Vec<T> {
         let band = || Band {
-            heads: vec![NONE; self.raster.width * BAND],
-            fragments: Vec::new(),
-            list: Vec::new(),
+            raster: self.raster,
+            begins: Vec::new(),
+            spans: Vec::new(),
+            here: Vec::new(),
             crossings: Vec::new(),
         };
         self.bands
@@ -275,7 +306,7 @@ impl ABuffer {
             .map_init(
                 || (state(), band()),
                 |(state, band), (number, members)| {
-                    band.collect_fragments(number, members, &self.footprints, self.raster);
+                    band.collect_spans(number, members, &self.footprints);
                     visit(state, band)
                 },
             )
@@ -296,54 +327,77 @@ fn footprints_of_bands(footprints: &[Footprint], raster: Raster) -> Vec<Vec<u32>
 }
 
 impl Band {
-    /// Fills the lists of the pixels of one band.
-    fn collect_fragments(&mut self, band: usize, members: &[u32], footprints: &[Footprint], raster: Raster) {
+    /// Finds the spans of one band.
+    fn collect_spans(&mut self, band: usize, members: &[u32], footprints: &[Footprint]) {
+        let raster = self.raster;
         let rows_here = (raster.height - band * BAND).min(BAND);
-        self.heads.clear();
-        self.heads.resize(raster.width * rows_here, NONE);
-        self.fragments.clear();
+        self.begins.clear();
+        self.begins.resize(raster.width * rows_here, NONE);
+        self.spans.clear();
         let first_row = band * BAND;
         for &id in members {
             let footprint = &footprints[id as usize];
             let rows = footprint.rows.start as usize..footprint.rows.end as usize;
             for y in rows.start.max(first_row)..rows.end.min(first_row + BAND) {
-                let heads = &mut self.heads[(y - first_row) * raster.width..][..raster.width];
                 let columns = footprint.covered(y, raster);
-                let Line { x: slope, y: row_slope, constant } = footprint.inverse_depth;
-                let at_row = row_slope * raster.row(y) + constant;
-                for (x, head) in columns.clone().zip(&mut heads[columns]) {
-                    let inverse_depth = slope * raster.column(x) + at_row;
-                    let next = std::mem::replace(head, self.fragments.len() as u32);
-                    self.fragments.push(Fragment { inverse_depth, crossing: footprint.crossing, next });
+                if columns.is_empty() {
+                    continue;
                 }
+                let begins = &mut self.begins[(y - first_row) * raster.width + columns.start];
+                let next = std::mem::replace(begins, self.spans.len() as u32);
+                let Line { x: slope, y: row_slope, constant } = footprint.inverse_depth;
+                self.spans.push(Span {
+                    slope,
+                    at_row: row_slope * raster.row(y) + constant,
+                    crossing: footprint.crossing,
+                    end: columns.end as u32,
+                    next,
+                });
             }
         }
     }
 
-    /// Calls `visit` with what each pixel's ray crosses, front to back: row by row.
-    pub(super) fn each_pixel(&mut self, mut visit: impl FnMut(&[Crossing])) {
-        for &head in &self.heads {
-            self.list.clear();
-            let mut next = head;
-            while next != NONE {
-                let fragment = self.fragments[next as usize];
-                self.list.push(fragment);
-                next = fragment.next;
+    /// Calls `visit` with what rays cross, front to back, and how many pixels beside one another that is so for: row by row.
+    pub(super) fn each_run(&mut self, mut visit: impl FnMut(usize, &[Crossing])) {
+        let Self { raster, begins, spans, here, crossings } = self;
+        for row in begins.chunks_exact(raster.width) {
+            here.clear();
+            let mut x = 0;
+            while x < row.len() {
+                here.retain(|span| span.end as usize > x);
+                let mut begin = row[x];
+                while let Some(span) = spans.get(begin as usize) {
+                    here.push(*span);
+                    begin = span.next;
+                }
+                let end = here.iter().map(|span| span.end as usize).min().unwrap_or(row.len());
+                let begin = row[x + 1..end].iter().position(|&begin| begin != NONE);
+                let end = begin.map_or(end, |columns| x + 1 + columns);
+
+                sort_at(here, raster.column(x));
+                // Inverse depths are linear: what is sorted at both ends is sorted between them.
+                let last = raster.column(end - 1);
+                let is_one = here.is_sorted_by(|a, b| a.compare(b, last).is_le());
+                let pixels = if is_one { end - x } else { 1 };
+                crossings.clear();
+                crossings.extend(here.iter().map(|span| span.crossing));
+                visit(pixels, crossings);
+                x += pixels;
             }
-            sort_front_to_back(&mut self.list);
-            self.crossings.clear();
-            self.crossings.extend(self.list.iter().map(|fragment| fragment.crossing));
-            visit(&self.crossings);
         }
     }
 }
 
-/// Sorts the fragments of a pixel by depth; faces in the same place (equal to the last bit, since the
-/// order of a face's vertices is canonical) by leaves before entries, then by id.
-fn sort_front_to_back(list: &mut [Fragment]) {
-    list.sort_unstable_by(|a, b| {
-        b.inverse_depth.total_cmp(&a.inverse_depth).then(a.crossing.cmp(&b.crossing))
-    });
+/// Sorts spans front to back at a column. There are few, and most are in order already.
+fn sort_at(spans: &mut [Span], column: f64) {
+    for i in 1..spans.len() {
+        for j in (1..=i).rev() {
+            if spans[j - 1].compare(&spans[j], column).is_le() {
+                break;
+            }
+            spans.swap(j - 1, j);
+        }
+    }
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! Where the rays of a picture enter the shell and leave it, from the A-buffer: all that a
 //! walk along them (M. Garrity, "Raytracing irregular volume data", 1990) needs to know.
 
-use super::abuffer::ABuffer;
+use super::abuffer::{ABuffer, Crossing};
 use super::relations::FaceTable;
 use crate::scene::View;
 use crate::shell::Shell;
@@ -9,18 +9,19 @@ use crate::shell::Shell;
 /// In [`Crossings::places`]: the ray leaves the shell here; else it enters it.
 pub const LEAVES: u32 = 1 << 31;
 
-/// In [`Crossings::first`]: the ray of this pixel is in two parts of the shell at once.
+/// In the first number of [`Crossings::of_pixels`]: the ray is in two parts of the shell at once.
 pub const INTRICATE: u32 = 1 << 31;
 
-/// In [`Crossings::first`]: the ray of this pixel begins in the shell.
+/// In the first number of [`Crossings::of_pixels`]: the ray begins in the shell.
 pub const BEGUN: u32 = 1 << 30;
 
 /// Where the rays of all pixels enter the shell and leave it.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Crossings {
-    /// For each pixel, row by row from the top, its first place; and after the last pixel, the number of all.
-    pub first: Vec<u32>,
-    /// Places of one pixel after another, front to back: four times a tetrahedron, and the number of its face.
+    /// For each pixel, row by row from the top, the range of its places: from the first number to before the second. Pixels whose rays
+    /// cross the same have one range.
+    pub of_pixels: Vec<[u32; 2]>,
+    /// Front to back, in each range: four times a tetrahedron, and the number of its face.
     pub places: Vec<u32>,
     /// Pixels whose ray begins in the shell.
     pub begun_inside: u64,
@@ -38,34 +39,38 @@ impl Crossings {
             || (),
             |(), band| {
                 let mut found = Self::default();
-                band.each_pixel(|crossings| {
-                    let mut first = found.places.len() as u32;
-                    let leaves = crossings.iter().filter(|crossing| crossing.leaves()).count();
-                    let mut open = (2 * leaves).saturating_sub(crossings.len());
-                    let begins_inside = open > 0;
-                    let mut overlaps = open > 1;
-                    for crossing in crossings {
-                        overlaps |= !crossing.leaves() && open > 0;
-                        open = if crossing.leaves() { open.saturating_sub(1) } else { open + 1 };
-                        found.places.push(crossing.place() | if crossing.leaves() { LEAVES } else { 0 });
-                    }
-                    first |= if begins_inside { BEGUN } else { 0 };
-                    found.first.push(if overlaps { first | INTRICATE } else { first });
-                    found.begun_inside += u64::from(begins_inside);
-                    found.overlapping += u64::from(overlaps);
-                });
+                band.each_run(|pixels, crossings| found.add(pixels, crossings));
                 found
             },
         );
         let mut all = Self::default();
+        all.of_pixels.reserve_exact(view.width as usize * view.height as usize);
         for band in bands {
             let before = all.places.len() as u32;
-            all.first.extend(band.first.iter().map(|first| before + first));
+            all.of_pixels.extend(band.of_pixels.iter().map(|range| range.map(|place| before + place)));
             all.places.extend(band.places);
             all.begun_inside += band.begun_inside;
             all.overlapping += band.overlapping;
         }
-        all.first.push(all.places.len() as u32);
         all
+    }
+
+    /// Adds pixels beside one another whose rays cross the same.
+    fn add(&mut self, pixels: usize, crossings: &[Crossing]) {
+        let leaves = crossings.iter().filter(|crossing| crossing.leaves()).count();
+        let mut open = (2 * leaves).saturating_sub(crossings.len());
+        let begins_inside = open > 0;
+        let mut overlaps = open > 1;
+        let first = self.places.len() as u32;
+        for crossing in crossings {
+            overlaps |= !crossing.leaves() && open > 0;
+            open = if crossing.leaves() { open.saturating_sub(1) } else { open + 1 };
+            self.places.push(crossing.place() | if crossing.leaves() { LEAVES } else { 0 });
+        }
+        let flags = if begins_inside { BEGUN } else { 0 } | if overlaps { INTRICATE } else { 0 };
+        let range = [first | flags, self.places.len() as u32];
+        self.of_pixels.extend(std::iter::repeat_n(range, pixels));
+        self.begun_inside += if begins_inside { pixels as u64 } else { 0 };
+        self.overlapping += if overlaps { pixels as u64 } else { 0 };
     }
 }

@@ -33,7 +33,7 @@ pub(super) fn relate(abuffer: &ABuffer, tetrahedra: usize) -> Vec<Vec<[u32; 2]>>
         || Scratch::new(tetrahedra),
         |scratch, band| {
             let mut pairs = Vec::new();
-            band.each_pixel(|crossings| scratch.follow_ray(crossings, &mut pairs));
+            band.each_run(|_, crossings| scratch.follow_ray(crossings, &mut pairs));
             pairs
         },
     )

@@ -17,11 +17,16 @@
 //! through it. Their faces towards it are in the A-buffer too, so that nothing is lost where several such
 //! tetrahedra lie behind one another.
 
+use std::sync::atomic::{self, AtomicU8};
+
 use glam::DVec3;
 use rayon::prelude::*;
 use robust::{Coord3D, orient3d};
 
 use crate::shell::{EXTERIOR, Topology};
+
+/// Faces that one task of the thread pool takes: some 0.1 ms of work.
+const TASK: usize = 4096;
 
 /// One face of the shell with the tetrahedra on it.
 #[derive(Debug, Clone, Copy)]
@@ -181,34 +186,35 @@ impl FaceTable {
     /// [`Shell::determinants`](crate::shell::Shell::determinants)), as seen from `eye`. `vertices` and `eye` are in world space.
     pub fn relate(&self, determinants: &[f64], vertices: &[DVec3], eye: DVec3) -> Relations {
         let at = |id: u32| vertices[id as usize];
-        let eye_sides: Vec<i8> = self
-            .faces
-            .par_iter()
-            .with_min_len(1024)
-            .map(|f| orientation(at(f.vertices[0]), at(f.vertices[1]), at(f.vertices[2]), eye))
-            .collect();
-
-        let mut pairs = Vec::with_capacity(self.faces.len());
-        let mut exit_faces = vec![0u8; determinants.len()];
-        let mut boundary = Vec::new();
-        for (face, &eye_side) in self.faces.iter().zip(&eye_sides) {
-            if eye_side == 0 {
-                continue;
-            }
-            let sides = face.sides(determinants);
-            for (i, cell) in face.cells.into_iter().enumerate() {
-                if sides[i] != 0 {
-                    exit_faces[cell as usize] |= u8::from(sides[i] == eye_side) << face.local[i];
+        let exit_faces: Vec<AtomicU8> = determinants.iter().map(|_| AtomicU8::new(0)).collect();
+        let of_some = |faces: &[Face]| {
+            let mut pairs = Vec::with_capacity(faces.len());
+            let mut boundary = Vec::new();
+            for face in faces {
+                let [a, b, c] = face.vertices;
+                let eye_side = orientation(at(a), at(b), at(c), eye);
+                if eye_side == 0 {
+                    continue;
+                }
+                let sides = face.sides(determinants);
+                for (i, cell) in face.cells.into_iter().enumerate() {
+                    if sides[i] == eye_side {
+                        exit_faces[cell as usize].fetch_or(1 << face.local[i], atomic::Ordering::Relaxed);
+                    }
+                }
+                boundary.extend(face.boundary(sides, eye_side).into_iter().flatten());
+                let [first, second] = face.cells;
+                if second != EXTERIOR && sides[0] != sides[1] {
+                    let first_in_front = sides[0] == eye_side || sides[1] == -eye_side;
+                    pairs.push(if first_in_front { [first, second] } else { [second, first] });
                 }
             }
-            boundary.extend(face.boundary(sides, eye_side).into_iter().flatten());
-            let [first, second] = face.cells;
-            if second != EXTERIOR && sides[0] != sides[1] {
-                let first_in_front = sides[0] == eye_side || sides[1] == -eye_side;
-                pairs.push(if first_in_front { [first, second] } else { [second, first] });
-            }
-        }
-        Relations { pairs, exit_faces, boundary }
+            (pairs, boundary)
+        };
+        let parts: Vec<_> = self.faces.par_chunks(TASK).map(of_some).collect();
+        let (pairs, boundary): (Vec<_>, Vec<_>) = parts.into_iter().unzip();
+        let exit_faces = exit_faces.into_iter().map(AtomicU8::into_inner).collect();
+        Relations { pairs: pairs.concat(), exit_faces, boundary: boundary.concat() }
     }
 }
 

@@ -70,7 +70,7 @@ impl Ways {
 
 /// Where rays enter the shell and leave it, on the device.
 pub struct RayBuffers {
-    first: Buffer,
+    of_pixels: Buffer,
     places: Buffer,
 }
 
@@ -81,7 +81,7 @@ impl RayBuffers {
     /// As [`Buffer::numbers`].
     pub fn new(gpu: &Arc<Gpu>, crossings: &Crossings) -> Result<Self> {
         Ok(Self {
-            first: Buffer::numbers(gpu, "the pixels' crossings", &crossings.first)?,
+            of_pixels: Buffer::pairs(gpu, "the pixels' crossings", &crossings.of_pixels)?,
             places: Buffer::numbers(gpu, "where rays cross the boundary", &crossings.places)?,
         })
     }
@@ -91,13 +91,13 @@ impl RayBuffers {
     /// # Errors
     /// As [`Buffer::numbers`].
     pub fn refill(&mut self, crossings: &Crossings) -> Result<()> {
-        self.first.refill(&crossings.first)?;
+        self.of_pixels.refill(&crossings.of_pixels)?;
         self.places.refill(&crossings.places)
     }
 
     /// By the binding that shaders name.
     pub fn buffers(&self) -> [(u32, &Buffer); 2] {
-        [(20, &self.first), (21, &self.places)]
+        [(20, &self.of_pixels), (21, &self.places)]
     }
 }
 
