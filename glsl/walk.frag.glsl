@@ -52,19 +52,25 @@ void main() {
             passes++;
             first = 0;
             steps.count = 0;
-            if (place == NOWHERE) {
+            bool is_outside = place == NOWHERE;
+            if (is_outside) {
                 is_done = next == last;
                 if (is_done) break;
                 uint crossing = texelFetch(crossings, next++).x;
                 if ((crossing & LEAVES) != 0) continue;
                 place = crossing;
-                float depth;
-                strays = strays || !enters(place, ray, depth);
-                from = max(from, depth);
             }
             cell = place >> 2;
+            // Of all tetrahedra alike, also where the ray goes on: to lavapipe a branch saves nothing, so that what is read here is read
+            // once for both.
+            Faces faces = faces_at(place, ray);
+            if (is_outside) {
+                float depth;
+                strays = strays || !enters(faces, ray, depth);
+                from = max(from, depth);
+            }
             float depth;
-            uint exit = exit_of(place, ray, depth);
+            uint exit = exit_of(place, faces, depth);
             vec2 segment = vec2(from, min(depth, farthest));
             if (exit != NOWHERE && segment.y > segment.x) {
                 vec4 rows[3];

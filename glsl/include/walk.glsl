@@ -52,18 +52,36 @@ void crossings_of_pixel(bool intricate, out int next, out int last, out bool is_
 // Below this cosine a face is met too flatly.
 const float FLAT = 1e-4;
 
-// Whether a ray enters the shell at `place` as it should, there and not later; and how deep.
-bool enters(uint place, vec3 ray, out float depth) {
-    vec4 face = plane_at(place);
-    float towards_inside = dot(face.xyz, ray);
-    depth = face.w / towards_inside;
-    if (!(towards_inside > FLAT * length(ray))) return false;
-    for (uint i = 1; i < 4; i++) {
-        vec4 plane = plane_at((place & ~3u) | ((place + i) & 3));
-        towards_inside = dot(plane.xyz, ray);
-        if (towards_inside > 0.0 && plane.w > depth * (1.0 + STRAY) * towards_inside) return false;
+// The faces of a tetrahedron as a ray meets them: first that at a place, then the others by their numbers, going round. Its length
+// along the inward normal, and its depth at the plane times that.
+struct Faces {
+    vec4 towards_inside;
+    vec4 heights;
+};
+
+uint other_face(uint place, uint i) {
+    return (place & ~3u) | ((place + i) & 3);
+}
+
+Faces faces_at(uint place, vec3 ray) {
+    Faces faces;
+    for (uint i = 0; i < 4; i++) {
+        vec4 plane = plane_at(other_face(place, i));
+        faces.towards_inside[i] = dot(plane.xyz, ray);
+        faces.heights[i] = plane.w;
     }
-    return true;
+    return faces;
+}
+
+// Whether a ray enters the shell by the first of these faces as it should, there and not later; and how deep.
+bool enters(Faces faces, vec3 ray, out float depth) {
+    depth = faces.heights[0] / faces.towards_inside[0];
+    bool is_late = false;
+    for (uint i = 1; i < 4; i++) {
+        float towards_inside = faces.towards_inside[i];
+        is_late = is_late || (towards_inside > 0.0 && faces.heights[i] > depth * (1.0 + STRAY) * towards_inside);
+    }
+    return faces.towards_inside[0] > FLAT * length(ray) && !is_late;
 }
 
 // Whether a ray that leaves the shell by `exit`, after this depth, leaves it as it should: at `leave`, or as deep.
@@ -74,36 +92,30 @@ bool leaves(float depth, uint exit, uint leave, vec3 ray) {
         && (exit == leave || depth > face.w / towards_inside * (1.0 - STRAY));
 }
 
-// Where a ray leaves the tetrahedron that it has entered at `place`, and how deep; NOWHERE where rounding, or want of volume,
-// leaves it no way out.
-uint exit_of(uint place, vec3 ray, out float depth) {
+// Where a ray leaves the tetrahedron that it has entered at `place`, whose faces are these, and how deep; NOWHERE where rounding, or
+// want of volume, leaves it no way out.
+uint exit_of(uint place, Faces faces, out float depth) {
     uint exit = NOWHERE;
     depth = FAR;
     for (uint i = 1; i < 4; i++) {
-        uint other = (place & ~3u) | ((place + i) & 3);
-        vec4 plane = plane_at(other);
-        float towards_inside = dot(plane.xyz, ray);
-        float at = plane.w / towards_inside;
-        if (towards_inside < 0.0 && at < depth) {
+        float at = faces.heights[i] / faces.towards_inside[i];
+        if (faces.towards_inside[i] < 0.0 && at < depth) {
             depth = at;
-            exit = other;
+            exit = other_face(place, i);
         }
     }
     return exit;
 }
 
 // As `exit_of`, of a ray that leaves the tetrahedron at `place`: where it has entered it.
-uint entry_of(uint place, vec3 ray, out float depth) {
+uint entry_of(uint place, Faces faces, out float depth) {
     uint entry = NOWHERE;
     depth = -FAR;
     for (uint i = 1; i < 4; i++) {
-        uint other = (place & ~3u) | ((place + i) & 3);
-        vec4 plane = plane_at(other);
-        float towards_inside = dot(plane.xyz, ray);
-        float at = plane.w / towards_inside;
-        if (towards_inside > 0.0 && at > depth) {
+        float at = faces.heights[i] / faces.towards_inside[i];
+        if (faces.towards_inside[i] > 0.0 && at > depth) {
             depth = at;
-            entry = other;
+            entry = other_face(place, i);
         }
     }
     return entry;
@@ -114,7 +126,7 @@ uint back_to_start(uint place, vec3 ray, inout uint passes) {
     float depth = 0.0;
     while (place != NOWHERE && passes < MOST_PASSES) {
         passes++;
-        place = entry_of(place, ray, depth);
+        place = entry_of(place, faces_at(place, ray), depth);
         if (place == NOWHERE || depth <= view.near) break;
         place = texelFetch(beyond, int(place)).x;
     }
