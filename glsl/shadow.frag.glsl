@@ -1,5 +1,6 @@
 #version 450
 #extension GL_ARB_shading_language_include : require
+// switches: SPARSE
 // A pixel of a light's picture: how the medium dims the light along its ray. The order of tetrahedra does not matter to the
 // whole, but the curve is made front to back, by the same means as cycle.frag.glsl; where media overlap, they add.
 // Knots are placed as the opacity grows; once there are too many, every other one is left out.
@@ -80,22 +81,25 @@ bool follow(vec3 origin, vec3 ray, out float optical, out float end_depth) {
                 if (spans[end].y > z) next = min(next, spans[end].y);
             }
             if (end < count) next = min(next, spans[end].x);
-            uint samples = 0;
+            Steps steps = no_steps();
             uint present = 0;
             Path path; // of the last one, which mostly is the only one: it need not be read again for every sample
             for (uint hit = first; hit < end; hit++) {
                 if (spans[hit].y <= z) continue;
                 path = path_from(cells[hits[hit]].texture, origin, ray, light.pixel, is_parallel);
-                samples = max(samples, sample_count(path, z, next));
+                Steps alone = steps_of(path, vec2(z, next));
+                if (present == 0 || alone.count > steps.count) steps = alone;
                 present++;
             }
-            passes += AT_ONCE * (end - first + 2) * (samples + 3);
+            passes += AT_ONCE * (end - first + 2) * (steps.count + 3);
             if (passes > MOST_PASSES) break;
-            float step = (next - z) / float(samples); // in a gap there are no samples
-            for (uint i = 0; i < samples; i++) {
-                float at = z + (float(i) + 0.5) * step;
+            // In a gap there are no steps. The passes of looking are among those of the samples that it leaves out.
+            bool is_alone = present == 1;
+            uint looks = 0;
+            for (uint i = is_alone ? seek(path, steps, 0, looks) : 0; i < steps.count;) {
+                float at = middle(steps, i);
                 float of_step = 0.0;
-                if (present == 1) {
+                if (is_alone) {
                     of_step = extinction(fetch(path, at));
                 } else {
                     for (uint hit = first; hit < end; hit++) {
@@ -103,12 +107,13 @@ bool follow(vec3 origin, vec3 ray, out float optical, out float end_depth) {
                         of_step += extinction(fetch(path_from(cells[hits[hit]].texture, origin, ray, light.pixel, is_parallel), at));
                     }
                 }
-                of_step *= max(step * per_depth, LEAST);
+                of_step *= max(steps.size * per_depth, LEAST);
                 if (of_step > 0.0) {
-                    place(z + float(i) * step, step, optical, of_step);
+                    place(z + float(i) * steps.size, steps.size, optical, of_step);
                     optical += of_step;
-                    end_depth = z + float(i + 1) * step;
+                    end_depth = z + float(i + 1) * steps.size;
                 }
+                i = is_alone ? seek(path, steps, i + 1, looks) : i + 1;
             }
             z = next;
         }

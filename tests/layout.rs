@@ -137,7 +137,7 @@ fn nothing_is_compiled_in_that_a_scene_does_not_need() {
     let of_solids: &[&str] = &["solid_depth", "solid_depths"];
     let of_depth: &[&str] = &["out_depth"];
     let of_leaps: &[&str] = &["proximity"];
-    for family in [&shaders::SHELL_FRAG, &shaders::WALK_FRAG] {
+    for family in [&shaders::SHELL_FRAG, &shaders::WALK_FRAG, &shaders::SHADOW_FRAG] {
         let (without, with) = (words(family.with(&[])), words(family.with(&["SPARSE"])));
         assert!(of_leaps.iter().all(|name| !without.contains(name) && with.contains(name)));
     }

@@ -231,7 +231,8 @@ impl Method for Shell {
             let shadows = Shadows::draw(
                 &self.gpu,
                 &self.scene,
-                &self.volume.texture,
+                &self.volume,
+                self.leaps(),
                 &*self.progress,
                 &self.interrupt,
             )?;

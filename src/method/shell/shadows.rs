@@ -14,9 +14,10 @@ use rayon::prelude::*;
 
 use super::constants::{ViewConstants, constants_of_volume};
 use super::seen::{Cell, Tile};
+use super::volume::DeviceVolume;
 use crate::Result;
 use crate::gpu::{
-    Batch, Buffer, Draw, Gpu, Keeps, Pipeline, PipelineInfo, Sampled, Target, Texture3d, draw, shaders,
+    Batch, Buffer, Draw, Gpu, Keeps, Pipeline, PipelineInfo, Sampled, Target, draw, shaders,
 };
 use crate::progress::{Interrupt, Progress};
 use crate::scene::shading::MOST_LIGHTS;
@@ -93,7 +94,7 @@ struct Drawn {
 }
 
 impl Shadows {
-    /// Draws the pictures of all lights that cast shadows; `None` where there is no such light.
+    /// Draws the pictures of all lights that cast shadows; `None` where there is no such light. Where `leaps`, rays do, over what is empty.
     ///
     /// # Errors
     /// [`Error::Device`](crate::Error::Device) where the pictures are too large for the device,
@@ -101,7 +102,8 @@ impl Shadows {
     pub fn draw(
         gpu: &Arc<Gpu>,
         scene: &Scene,
-        volume: &Texture3d,
+        volume: &DeviceVolume,
+        leaps: bool,
         progress: &dyn Progress,
         interrupt: &Interrupt,
     ) -> Result<Option<Self>> {
@@ -135,7 +137,7 @@ impl Shadows {
             columns,
             opacity_distance: scene.medium.opacity_distance,
         };
-        shadows.draw_curves(gpu, scene, volume, &|done| {
+        shadows.draw_curves(gpu, scene, volume, leaps, &|done| {
             progress.fraction(done);
             interrupt.check()
         })?;
@@ -221,7 +223,8 @@ impl Shadows {
         &mut self,
         gpu: &Arc<Gpu>,
         scene: &Scene,
-        volume: &Texture3d,
+        volume: &DeviceVolume,
+        leaps: bool,
         between: &dyn Fn(f64) -> Result<()>,
     ) -> Result<()> {
         let mut drawn = Drawn::default();
@@ -242,12 +245,12 @@ impl Shadows {
         let minified = drawn.minified || !scene.skips.allow(Skip::Levels);
         let info = PipelineInfo {
             vertex: shaders::TILE_VERT.with(&["LIGHT"]),
-            fragment: shaders::SHADOW_FRAG.with(&[]),
+            fragment: shaders::SHADOW_FRAG.with(if leaps { &["SPARSE"] } else { &[] }),
             constants: &constants_of_volume(March::default(), minified, &scene.volume),
             storage_buffers: &[0, 1, 2, 6],
             uniform_buffers: &[],
             texel_buffers: &[],
-            textures: &[8],
+            textures: if leaps { &[8, 22] } else { &[8] },
             push_constant_bytes: size_of::<ViewConstants>() as u32,
             keeps: Keeps::Last,
         };
@@ -261,7 +264,7 @@ impl Shadows {
             target: &self.curves,
             clears: true,
             buffers: &[(0, &cells), (1, &tiles_buffer), (2, &members), (6, &pictures)],
-            textures: &[(8, Sampled::Texture(volume))],
+            textures: &volume.textures(),
             push_constants: bytemuck::bytes_of(&constants),
             batches: &[Batch { pipeline: &pipeline, vertices: 0..6 * tiles }],
             between,
