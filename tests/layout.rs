@@ -94,7 +94,7 @@ fn of_the_shell(lit: bool) -> Vec<Spirv> {
 /// The fragment shaders that read the pictures of lights.
 fn shadowed() -> Vec<Spirv> {
     let on = ["LIT", "SHADOWS"];
-    [&shaders::SHELL_FRAG, &shaders::CYCLE_FRAG, &shaders::SOLID_FRAG].map(|family| family.with(&on)).to_vec()
+    [&shaders::SHELL_FRAG, &shaders::CYCLE_FRAG, &shaders::SURFACE_FRAG].map(|family| family.with(&on)).to_vec()
 }
 
 #[test]
@@ -199,7 +199,7 @@ fn shell_structs_agree() {
 #[test]
 fn structs_of_solids_and_shadows_agree() {
     for shader in
-        [shaders::SOLID_VERT.with(&[]), shaders::SOLID_FRAG.with(&[]), shaders::SOLID_FRAG.with(&["LIT"])]
+        [shaders::SOLID_VERT.with(&[]), shaders::SURFACE_FRAG.with(&[]), shaders::SURFACE_FRAG.with(&["LIT"])]
     {
         let (members, stride) = layout(shader, "Triangle");
         assert_eq!(members, host!(Triangle: corners, plane, texture, normal, facing, colour));

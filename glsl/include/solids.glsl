@@ -1,7 +1,7 @@
 // Opaque surfaces before the eye, where there are any.
 
 #ifdef SOLIDS
-layout(set = 0, binding = 15) uniform sampler2D solid_depths; // 0 where there is none
+layout(set = 0, binding = 15) uniform sampler2D solid_depths; // the first: depth, 0 where there is none
 
 // Of the nearest at this pixel.
 float solid_depth() {

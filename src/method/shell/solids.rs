@@ -7,6 +7,7 @@ use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
 use super::ViewConstants;
+use super::seen::Tile;
 use crate::Result;
 use crate::gpu::{
     Batch, Buffer, Draw, Gpu, Keeps, Pipeline, PipelineInfo, Sampled, Target, Texture3d, draw, shaders,
@@ -66,10 +67,13 @@ pub fn have_same_textures(a: &[Solid], b: &[Solid]) -> bool {
     a.len() == b.len() && a.iter().zip(b).all(same)
 }
 
-/// A picture of them, and what draws it.
+/// Pictures of them, and what draws those.
 pub struct SolidView {
-    target: Target,
-    pipeline: Pipeline,
+    /// Which triangle is the nearest in each pixel, and its depth.
+    nearest: Target,
+    find: Pipeline,
+    colours: Target,
+    light: Pipeline,
 }
 
 impl SolidView {
@@ -78,29 +82,42 @@ impl SolidView {
     /// # Errors
     /// As [`Solids::new`].
     pub fn new(gpu: &Arc<Gpu>, view: &View, on: &[&str], constants: &[u32]) -> Result<Self> {
-        let target = Target::sampled(gpu, "the solids", [view.width, view.height], 2, true)?;
-        let textures = [10, 11, 12, 13, 14, 17];
-        let info = PipelineInfo {
+        let target =
+            |nearest| Target::sampled(gpu, "the solids", [view.width, view.height], 1, nearest);
+        let (nearest, colours) = (target(true)?, target(false)?);
+        let find = PipelineInfo {
             vertex: shaders::SOLID_VERT.with(on),
             fragment: shaders::SOLID_FRAG.with(on),
-            constants,
+            constants: &[],
             storage_buffers: &[7],
+            uniform_buffers: &[],
+            texel_buffers: &[],
+            textures: &[],
+            push_constant_bytes: size_of::<ViewConstants>() as u32,
+            keeps: Keeps::Nearest,
+        };
+        let textures = [10, 11, 12, 13, 14, 15, 17];
+        let light = PipelineInfo {
+            vertex: shaders::TILE_VERT.with(&[]),
+            fragment: shaders::SURFACE_FRAG.with(on),
+            constants,
+            storage_buffers: &[1, 7],
             uniform_buffers: match (on.contains(&"LIT"), on.contains(&"SHADOWS")) {
                 (false, _) => &[],
                 (true, false) => &[5],
                 (true, true) => &[5, 6],
             },
-            texel_buffers: &[],
             textures: if on.contains(&"SHADOWS") { &textures } else { &textures[5..] },
-            push_constant_bytes: size_of::<ViewConstants>() as u32,
-            keeps: Keeps::Nearest,
+            keeps: Keeps::Last,
+            ..find
         };
-        let pipeline = Pipeline::new(gpu, &target, &info)?;
-        Ok(Self { target, pipeline })
+        let find = Pipeline::new(gpu, &nearest, &find)?;
+        let light = Pipeline::new(gpu, &colours, &light)?;
+        Ok(Self { nearest, find, colours, light })
     }
 
-    /// Draws the solids. `lights` and `shadows` are what a lit scene's shaders read; `bias` is how far, in world units, points are
-    /// moved off the surface before their shadow is looked up.
+    /// Draws the solids: which is the nearest in each pixel, and then, once a pixel, its colour. `lights` and `shadows` are what a lit
+    /// scene's shaders read; `bias` is how far, in world units, points are moved off the surface before their shadow is looked up.
     ///
     /// # Errors
     /// As [`Solids::new`], and [`Error::Interrupted`](crate::Error::Interrupted).
@@ -127,30 +144,65 @@ impl SolidView {
             .into_par_iter()
             .map(|(solid, triangle)| eye.triangle(solid, triangle))
             .collect();
-        let buffer = Buffer::storage(gpu, "the solids", &triangles)?;
-        let buffers: Vec<(u32, &Buffer)> = lights.iter().copied().chain([(7, &buffer)]).collect();
         let mut first = 0;
-        for (index, (solid, texture)) in scene.solids.iter().zip(&solids.textures).enumerate() {
-            let end = first + 3 * solid.mesh.triangles.len() as u32;
-            let textures: Vec<_> = shadows.iter().copied().chain([(17, Sampled::Texture(texture))]).collect();
+        let tile = |solid: &Solid| {
+            let members = [first, first + solid.mesh.triangles.len() as u32];
+            first = members[1];
+            let own = &triangles[members[0] as usize..members[1] as usize];
+            Tile { bounds: bounds(own, view), members, picture: 0, padding: 0 }
+        };
+        let tiles: Vec<Tile> = scene.solids.iter().map(tile).collect();
+        let triangles = Buffer::storage(gpu, "the solids", &triangles)?;
+        let tiles = Buffer::storage(gpu, "the solids' bounds", &tiles)?;
+        let buffers: Vec<(u32, &Buffer)> = lights.iter().copied().chain([(1, &tiles), (7, &triangles)]).collect();
+        let find = Draw {
+            target: &self.nearest,
+            clears: true,
+            buffers: &buffers,
+            textures: &[],
+            push_constants: bytemuck::bytes_of(constants),
+            batches: &[Batch { pipeline: &self.find, vertices: 0..3 * first }],
+            between: &|_| interrupt.check(),
+        };
+        draw(&find)?;
+        for (index, texture) in (0..).zip(&solids.textures) {
+            let own = [(15, Sampled::Picture(&self.nearest, 0)), (17, Sampled::Texture(texture))];
+            let textures: Vec<_> = shadows.iter().copied().chain(own).collect();
             draw(&Draw {
-                target: &self.target,
+                target: &self.colours,
                 clears: index == 0,
-                buffers: &buffers,
                 textures: &textures,
-                push_constants: bytemuck::bytes_of(constants),
-                batches: &[Batch { pipeline: &self.pipeline, vertices: first..end }],
-                between: &|_| interrupt.check(),
+                batches: &[Batch { pipeline: &self.light, vertices: 6 * index..6 * (index + 1) }],
+                ..find
             })?;
-            first = end;
         }
         Ok(())
     }
 
     /// By the binding that shaders name: depth, colour.
     pub fn textures(&self) -> [(u32, Sampled<'_>); 2] {
-        [(15, Sampled::Picture(&self.target, 1)), (16, Sampled::Picture(&self.target, 0))]
+        [(15, Sampled::Picture(&self.nearest, 0)), (16, Sampled::Picture(&self.colours, 0))]
     }
+}
+
+/// What triangles cover of the picture, in clip space: left, top, right, bottom. All of it, where one reaches before the near plane.
+fn bounds(triangles: &[Triangle], view: &View) -> [f32; 4] {
+    let size = [view.width, view.height].map(f64::from);
+    let per_clip = size.map(|pixels| 0.5 * pixels * view.pixel_at_unit_depth());
+    let mut bounds = [f64::INFINITY, f64::INFINITY, f64::NEG_INFINITY, f64::NEG_INFINITY];
+    for [x, y, z, _] in triangles.iter().flat_map(|triangle| triangle.corners) {
+        if z <= 0.0 {
+            return [-1.0, -1.0, 1.0, 1.0];
+        }
+        for (axis, place) in [x, -y].into_iter().enumerate() {
+            let place = f64::from(place) / f64::from(z) / per_clip[axis];
+            // A pixel more than rounding can be off.
+            let pixel = 2.0 / size[axis];
+            bounds[axis] = bounds[axis].min(place - pixel);
+            bounds[axis + 2] = bounds[axis + 2].max(place + pixel);
+        }
+    }
+    bounds.map(|place| place.clamp(-1.0, 1.0) as f32)
 }
 
 struct Eye {
