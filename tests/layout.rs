@@ -94,7 +94,9 @@ fn of_the_shell(lit: bool) -> Vec<Spirv> {
 /// The fragment shaders that read the pictures of lights.
 fn shadowed() -> Vec<Spirv> {
     let on = ["LIT", "SHADOWS"];
-    [&shaders::SHELL_FRAG, &shaders::CYCLE_FRAG, &shaders::SURFACE_FRAG].map(|family| family.with(&on)).to_vec()
+    [&shaders::SHELL_FRAG, &shaders::CYCLE_FRAG, &shaders::SURFACE_FRAG]
+        .map(|family| family.with(&on))
+        .to_vec()
 }
 
 #[test]

@@ -150,7 +150,15 @@ impl Footprint {
         let inverse_depth = Line::new(normal, pixel, distance.recip());
         let edge_columns = edges.map(|edge| -edge.x.recip());
         let is_level = edges.iter().any(|edge| edge.x == 0.0);
-        Some(Self { edges, edge_columns, is_level, inverse_depth, columns, rows, crossing: Crossing::new(face) })
+        Some(Self {
+            edges,
+            edge_columns,
+            is_level,
+            inverse_depth,
+            columns,
+            rows,
+            crossing: Crossing::new(face),
+        })
     }
 
     /// The columns of row `y` that are covered.

@@ -16,9 +16,7 @@ use super::constants::{ViewConstants, constants_of_volume};
 use super::seen::{Cell, Tile};
 use super::volume::DeviceVolume;
 use crate::Result;
-use crate::gpu::{
-    Batch, Buffer, Draw, Gpu, Keeps, Pipeline, PipelineInfo, Sampled, Target, draw, shaders,
-};
+use crate::gpu::{Batch, Buffer, Draw, Gpu, Keeps, Pipeline, PipelineInfo, Sampled, Target, draw, shaders};
 use crate::progress::{Interrupt, Progress};
 use crate::scene::shading::MOST_LIGHTS;
 use crate::scene::{LightView, March, Scene, Skip};

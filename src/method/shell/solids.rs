@@ -82,8 +82,7 @@ impl SolidView {
     /// # Errors
     /// As [`Solids::new`].
     pub fn new(gpu: &Arc<Gpu>, view: &View, on: &[&str], constants: &[u32]) -> Result<Self> {
-        let target =
-            |nearest| Target::sampled(gpu, "the solids", [view.width, view.height], 1, nearest);
+        let target = |nearest| Target::sampled(gpu, "the solids", [view.width, view.height], 1, nearest);
         let (nearest, colours) = (target(true)?, target(false)?);
         let find = PipelineInfo {
             vertex: shaders::SOLID_VERT.with(on),
@@ -154,7 +153,8 @@ impl SolidView {
         let tiles: Vec<Tile> = scene.solids.iter().map(tile).collect();
         let triangles = Buffer::storage(gpu, "the solids", &triangles)?;
         let tiles = Buffer::storage(gpu, "the solids' bounds", &tiles)?;
-        let buffers: Vec<(u32, &Buffer)> = lights.iter().copied().chain([(1, &tiles), (7, &triangles)]).collect();
+        let buffers: Vec<(u32, &Buffer)> =
+            lights.iter().copied().chain([(1, &tiles), (7, &triangles)]).collect();
         let find = Draw {
             target: &self.nearest,
             clears: true,
