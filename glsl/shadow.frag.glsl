@@ -16,7 +16,7 @@
 
 layout(location = 1) flat in uint picture;
 
-layout(location = 0) out vec4 out_curve[CURVE_IMAGES];
+layout(location = 0) out vec4 out_curve[CURVE_LAYERS];
 
 // Optical depth after which what is left of the light does not count: a thousandth.
 const float DARK = 7.0;
@@ -28,7 +28,8 @@ const float LEAST = 1e-30;
 
 float knots[KNOTS];
 uint placed = 0;
-float growth = 1.0 / (512.0 * float(GROWTHS)); // of opacity, from knot to knot
+float growth = LEAST_GROWTH;
+float doublings = 0.0; // of the growth
 float all_but_dark = 3.0e38; // the depth at which LEFT is left
 
 // Where in a step of an optical depth, after another one, that one is reached.
@@ -41,6 +42,7 @@ void thin_out() {
     for (uint i = 0; i < KNOTS / 2; i++) knots[i] = knots[2 * i];
     placed = (placed + 1) / 2;
     growth *= 2.0;
+    doublings += 1.0;
 }
 
 // Places the knots that are reached in a step at depth `from`, before which the optical depth is `before`.
@@ -93,7 +95,7 @@ bool follow(vec3 origin, vec3 ray, out float optical, out float end_depth) {
             }
             passes += AT_ONCE * (end - first + 2) * (steps.count + 3);
             if (passes > MOST_PASSES) break;
-            // In a gap there are no steps. The passes of looking are among those of the samples that it leaves out.
+            // In a gap there are no steps. Looks are fewer than the passes that were counted for the steps.
             bool is_alone = present == 1;
             uint looks = 0;
             for (uint i = is_alone ? seek(path, steps, 0, looks) : 0; i < steps.count;) {
@@ -129,7 +131,7 @@ void main() {
     vec3 ray = light.is_parallel != 0 ? vec3(0.0, 0.0, 1.0) : vec3(place, 1.0);
     float optical, end;
     if (!follow(origin, ray, optical, end)) {
-        for (uint i = 0; i < CURVE_IMAGES; i++) out_curve[i] = vec4(UNRESOLVED);
+        for (uint i = 0; i < CURVE_LAYERS; i++) out_curve[i] = vec4(UNRESOLVED);
         return;
     }
     if (optical == 0.0) discard;
@@ -141,7 +143,6 @@ void main() {
     float rest = whole - float(placed - 1) * growth;
     knots[placed] = rest > 0.0 ? last + (end - last) * growth / rest : last;
     for (uint i = placed + 1; i < KNOTS; i++) knots[i] = 3.0e38;
-    for (uint i = 0; i < CURVE_IMAGES; i++) {
-        for (uint j = 0; j < 4; j++) out_curve[i][j] = 4 * i + j < 2 ? (j == 0 ? growth : whole) : knots[4 * i + j - 2];
-    }
+    out_curve[0] = vec4(2.0 * doublings + whole, knots[4], knots[8], knots[12]);
+    for (uint i = 0; i < PARTS; i++) out_curve[1 + i] = vec4(knots[4 * i], knots[4 * i + 1], knots[4 * i + 2], knots[4 * i + 3]);
 }

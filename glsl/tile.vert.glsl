@@ -1,13 +1,13 @@
 #version 450
 #extension GL_ARB_shading_language_include : require
 // switches: LIGHT
-// A square of pixels as two triangles.
+// A rectangle of pixels as two triangles.
 
 #include "shell.glsl"
 
 layout(set = 0, binding = 1, std430) readonly buffer Tiles { Tile tiles[]; };
 
-layout(location = 0) flat out uvec2 members; // range of the list of cells: first, end
+layout(location = 0) flat out uvec2 members; // range of what is seen there: first, end
 #ifdef LIGHT
 layout(location = 1) flat out uint picture;
 #endif

@@ -32,7 +32,7 @@ void begin_at(uint place, vec3 ray) {
         return;
     }
     places[walkers] = place;
-    exits[walkers] = exit_of(place, faces_at(place, ray), ends[walkers]);
+    exits[walkers] = exit_of(faces_at(place, ray), ends[walkers]);
     if (exits[walkers] != NOWHERE) walkers++;
     else is_left = true;
 }
@@ -137,7 +137,7 @@ void main() {
                 }
                 if (place != NOWHERE) {
                     places[i] = place;
-                    exits[i] = exit_of(place, faces_at(place, ray), ends[i]);
+                    exits[i] = exit_of(faces_at(place, ray), ends[i]);
                 }
                 if (place == NOWHERE || exits[i] == NOWHERE) {
                     is_left = is_left || place != NOWHERE;

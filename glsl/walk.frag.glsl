@@ -70,7 +70,7 @@ void main() {
                 from = max(from, depth);
             }
             float depth;
-            uint exit = exit_of(place, faces, depth);
+            uint exit = exit_of(faces, depth);
             vec2 segment = vec2(from, min(depth, farthest));
             if (exit != NOWHERE && segment.y > segment.x) {
                 vec4 rows[3];

@@ -135,7 +135,7 @@ fn bindings(shader: Spirv) -> Vec<u32> {
 fn nothing_is_compiled_in_that_a_scene_does_not_need() {
     let words = |shader: Spirv| String::from_utf8_lossy(bytemuck::cast_slice(shader.words())).into_owned();
     let of_light: &[&str] = &["radiant", "frames", "lighting", "directions", "FIBRE", "GLOW"];
-    let of_shadows: &[&str] = &["light_pictures", "curve_0", "let_through"];
+    let of_shadows: &[&str] = &["light_pictures", "curves", "let_through"];
     let of_solids: &[&str] = &["solid_depth", "solid_depths"];
     let of_depth: &[&str] = &["out_depth"];
     let of_leaps: &[&str] = &["proximity"];
@@ -160,8 +160,11 @@ fn nothing_is_compiled_in_that_a_scene_does_not_need() {
     assert_eq!(bindings(shaders::WALK_FRAG.with(&[])), [8, 18, 19, 20, 21]);
     assert_eq!(shell(&["SOLIDS"]), [8, 15]);
     assert_eq!(shell(&["LIT"]), [3, 5, 8, 9]);
-    assert_eq!(shell(&["LIT", "SHADOWS"]), [3, 5, 6, 8, 9, 10, 11, 12, 13]);
-    assert_eq!(shell(&["LIT", "SHADOWS", "SOLIDS"]), [3, 5, 6, 8, 9, 10, 11, 12, 13, 14, 15]);
+    assert_eq!(shell(&["LIT", "SHADOWS"]), [3, 5, 6, 8, 9, 10]);
+    assert_eq!(shell(&["LIT", "SHADOWS", "SOLIDS"]), [3, 5, 6, 8, 9, 10, 14, 15]);
+    let surface = |on: &[&str]| bindings(shaders::SURFACE_FRAG.with(on));
+    assert_eq!(surface(&[]), [7, 15, 17]);
+    assert_eq!(surface(&["LIT", "SHADOWS"]), [5, 6, 7, 10, 14, 15, 17]);
     assert_eq!(bindings(shaders::CYCLE_FRAG.with(&[])), [0, 2, 8]);
     assert_eq!(bindings(shaders::CYCLE_FRAG.with(&["LIT"])), [0, 2, 3, 5, 8, 9]);
 }
@@ -174,6 +177,7 @@ fn shell_structs_agree() {
         shaders::SHADOW_FRAG.with(&[]),
         shaders::SOLID_FRAG.with(&[]),
         shaders::SOLID_VERT.with(&[]),
+        shaders::SURFACE_FRAG.with(&[]),
         shaders::BLOCKER_VERT.with(&[]),
     ];
     for shader in of_the_shell(false).into_iter().chain(of_the_shell(true)).chain(others) {

@@ -61,6 +61,13 @@ fn leaps_change_nothing() {
         with_and_without(Skip::EmptySpace, &load("animation/flag", &["image.size=[384, 256]"]));
     assert_eq!(with.1.chosen, "on");
     assert_eq!(difference([&with.0, &without.0]), 0.0);
+    // Rays of lights, which are parallel or come from a point.
+    for light in ["direction = [-0.8, -0.5, 0.45]", "position = [1, 2, -1]"] {
+        let of_shadows = ["shading.shadow_size=128", &format!("light=[{{ {light}, shadow = true }}]")];
+        let [with, without] = with_and_without(Skip::EmptySpace, &load("effects/shadow", &of_shadows));
+        assert_eq!(with.1.chosen, "on");
+        assert_eq!(difference([&with.0, &without.0]), 0.0, "{light}");
+    }
     let papers = Scene { march: March::Paper { samples: 10 }, ..load("lit-rocks", &[]) };
     assert_eq!(
         with_and_without(Skip::EmptySpace, &papers)[0].1.chosen,

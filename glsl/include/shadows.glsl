@@ -3,10 +3,7 @@
 #include "picture.glsl"
 #include "curve.glsl"
 
-layout(set = 0, binding = 10) uniform sampler2D curve_0;
-layout(set = 0, binding = 11) uniform sampler2D curve_1;
-layout(set = 0, binding = 12) uniform sampler2D curve_2;
-layout(set = 0, binding = 13) uniform sampler2D curve_3;
+layout(set = 0, binding = 10) uniform sampler2DArray curves;
 #ifdef SOLIDS
 #include "blocker.glsl"
 layout(set = 0, binding = 14) uniform sampler2D blockers;
@@ -19,18 +16,16 @@ float growths_done(vec4 from, vec4 to, float depth) {
 
 // Of the medium alone, along the ray of one pixel.
 float transmittance_until(ivec2 pixel, float depth) {
-    vec4 a = texelFetch(curve_0, pixel, 0);
+    vec4 whole = texelFetch(curves, ivec3(pixel, 0), 0);
     // Not silently: what is lit by this is not finite, and the host sees that.
-    if (a.y == UNRESOLVED) return uintBitsToFloat(0x7f800000u);
-    if (a.y == 0.0 || depth <= a.z) return 1.0;
-    vec4 b = texelFetch(curve_1, pixel, 0);
-    vec4 c = texelFetch(curve_2, pixel, 0);
-    vec4 d = texelFetch(curve_3, pixel, 0);
-    float last = clamp((depth - d.z) / max(d.w - d.z, 1e-7), 0.0, 1.0);
-    float done = growths_done(vec4(a.zw, b.xy), vec4(a.w, b.xyz), depth)
-        + growths_done(vec4(b.zw, c.xy), vec4(b.w, c.xyz), depth)
-        + growths_done(vec4(c.zw, d.xy), vec4(c.w, d.xyz), depth) + last;
-    return 1.0 - min(done * a.x, a.y);
+    if (whole.x == UNRESOLVED) return uintBitsToFloat(0x7f800000u);
+    float doublings = floor(0.5 * whole.x);
+    float opacity_of_all = whole.x - 2.0 * doublings;
+    int part = int(depth > whole.y) + int(depth > whole.z) + int(depth > whole.w);
+    vec4 from = texelFetch(curves, ivec3(pixel, 1 + part), 0);
+    vec4 to = vec4(from.yzw, part == 0 ? whole.y : part == 1 ? whole.z : part == 2 ? whole.w : 3.0e38);
+    float done = 4.0 * float(part) + growths_done(from, to, depth);
+    return opacity_of_all == 0.0 ? 1.0 : 1.0 - min(done * exp2(doublings) * LEAST_GROWTH, opacity_of_all);
 }
 
 // Of a light whose pictures begin at `first`.

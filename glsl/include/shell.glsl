@@ -22,9 +22,9 @@ struct Cell {
     vec4 texture[3];     // u, v, w of a point: dot(row.xyz, point) + row.w
 };
 
-// A square of pixels, and the tetrahedra that are seen in it.
+// A rectangle of pixels, and what is seen in it.
 struct Tile {
     vec4 bounds;         // clip space: left, top, right, bottom
-    uvec2 members;       // range of the list of cells: first, end
+    uvec2 members;       // range of the list of cells, or of triangles: first, end
     uint picture;        // of a light: which
 };

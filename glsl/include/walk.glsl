@@ -52,9 +52,10 @@ void crossings_of_pixel(bool intricate, out int next, out int last, out bool is_
 // Below this cosine a face is met too flatly.
 const float FLAT = 1e-4;
 
-// The faces of a tetrahedron as a ray meets them: first that at a place, then the others by their numbers, going round. Its length
-// along the inward normal, and its depth at the plane times that.
+// The faces of a tetrahedron as a ray meets them: first that at `place`, then the others by their numbers, going round. The ray's
+// component along each inward normal, and that times its depth at the plane.
 struct Faces {
+    uint place;
     vec4 towards_inside;
     vec4 heights;
 };
@@ -65,6 +66,7 @@ uint other_face(uint place, uint i) {
 
 Faces faces_at(uint place, vec3 ray) {
     Faces faces;
+    faces.place = place;
     for (uint i = 0; i < 4; i++) {
         vec4 plane = plane_at(other_face(place, i));
         faces.towards_inside[i] = dot(plane.xyz, ray);
@@ -92,30 +94,30 @@ bool leaves(float depth, uint exit, uint leave, vec3 ray) {
         && (exit == leave || depth > face.w / towards_inside * (1.0 - STRAY));
 }
 
-// Where a ray leaves the tetrahedron that it has entered at `place`, whose faces are these, and how deep; NOWHERE where rounding, or
+// Where a ray leaves the tetrahedron that it has entered by the first of these faces, and how deep; NOWHERE where rounding, or
 // want of volume, leaves it no way out.
-uint exit_of(uint place, Faces faces, out float depth) {
+uint exit_of(Faces faces, out float depth) {
     uint exit = NOWHERE;
     depth = FAR;
     for (uint i = 1; i < 4; i++) {
         float at = faces.heights[i] / faces.towards_inside[i];
         if (faces.towards_inside[i] < 0.0 && at < depth) {
             depth = at;
-            exit = other_face(place, i);
+            exit = other_face(faces.place, i);
         }
     }
     return exit;
 }
 
-// As `exit_of`, of a ray that leaves the tetrahedron at `place`: where it has entered it.
-uint entry_of(uint place, Faces faces, out float depth) {
+// As `exit_of`, of a ray that leaves the tetrahedron by the first of these faces: where it has entered it.
+uint entry_of(Faces faces, out float depth) {
     uint entry = NOWHERE;
     depth = -FAR;
     for (uint i = 1; i < 4; i++) {
         float at = faces.heights[i] / faces.towards_inside[i];
         if (faces.towards_inside[i] > 0.0 && at > depth) {
             depth = at;
-            entry = other_face(place, i);
+            entry = other_face(faces.place, i);
         }
     }
     return entry;
@@ -126,7 +128,7 @@ uint back_to_start(uint place, vec3 ray, inout uint passes) {
     float depth = 0.0;
     while (place != NOWHERE && passes < MOST_PASSES) {
         passes++;
-        place = entry_of(place, faces_at(place, ray), depth);
+        place = entry_of(faces_at(place, ray), depth);
         if (place == NOWHERE || depth <= view.near) break;
         place = texelFetch(beyond, int(place)).x;
     }

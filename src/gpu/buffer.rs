@@ -85,7 +85,8 @@ impl Buffer {
                 let texel = match format {
                     vk::Format::R32_UINT => 4,
                     vk::Format::R32G32_UINT => 8,
-                    _ => 16,
+                    vk::Format::R32G32B32A32_SFLOAT => 16,
+                    _ => unreachable!("no buffer has texels of another format"),
                 };
                 (data.len().max(texel), u64::from(gpu.limits.max_texel_buffer_elements) * texel as u64)
             }
@@ -97,6 +98,7 @@ impl Buffer {
                 message: format!("{name}: {bytes} bytes are more than the device's buffers hold ({limit})"),
                 help: Some(match kind {
                     Kind::Uniform => "use another device".into(),
+                    Kind::Texels(vk::Format::R32G32_UINT) => "ask for a smaller picture".into(),
                     _ => "use a mesh with fewer triangles".into(),
                 }),
             });
@@ -164,7 +166,7 @@ impl Buffer {
             .map_err(|error| vulkan_error(&format!("binding the memory of {name}"), error))?;
         if let Kind::Texels(format) = kind {
             let info = vk::BufferViewCreateInfo::default().buffer(raw).format(format).range(vk::WHOLE_SIZE);
-            // SAFETY: the buffer has its memory, and was made for views; every device has both formats for them.
+            // SAFETY: the buffer has its memory, and was made for views; every device has these formats for them.
             buffer.view = unsafe { gpu.raw.create_buffer_view(&info, None) }
                 .map_err(|error| vulkan_error(&format!("viewing {name}"), error))?;
         }

@@ -39,22 +39,22 @@ pub struct Draw<'a> {
 pub enum Sampled<'a> {
     /// Filtered.
     Texture(&'a Texture3d),
-    /// This image of a target that was made [for shaders](Target::sampled) and has been drawn, pixel by pixel.
-    Picture(&'a Target, usize),
+    /// A target that was made [for shaders](Target::sampled) and has been drawn, pixel by pixel.
+    Picture(&'a Target),
 }
 
 impl Sampled<'_> {
     pub(super) fn gpu(&self) -> &Arc<Gpu> {
         match self {
             Self::Texture(texture) => &texture.gpu,
-            Self::Picture(target, _) => &target.gpu,
+            Self::Picture(target) => &target.gpu,
         }
     }
 
     pub(super) fn sampler_and_view(&self) -> (vk::Sampler, vk::ImageView) {
         match self {
             Self::Texture(texture) => (texture.sampler, texture.image.view),
-            Self::Picture(target, image) => (target.sampler, target.images[*image].view),
+            Self::Picture(target) => (target.sampler, target.images[0].view),
         }
     }
 }
@@ -192,7 +192,7 @@ fn submit_part(
         }
         stamp(commands, vk::PipelineStageFlags::TOP_OF_PIPE, 0);
         // Of colours and of depths; depth 0 is the farthest.
-        let attachments = target.images.len() + usize::from(target.depth.is_some());
+        let attachments = target.attachments() + usize::from(target.depth.is_some());
         let clears = vec![vk::ClearValue { color: vk::ClearColorValue { float32: [0.0; 4] } }; attachments];
         let begin = vk::RenderPassBeginInfo::default()
             .render_pass(render_pass)

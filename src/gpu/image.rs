@@ -11,11 +11,12 @@ use super::device::{Gpu, vulkan_error};
 use super::memory::{allocate, free};
 use crate::Result;
 
-/// An image with its memory and one view of all of it.
+/// An image with its memory, one view of all of it, and one of each layer where it has several.
 #[derive(Debug)]
 pub(super) struct DeviceImage {
     pub(super) raw: vk::Image,
     pub(super) view: vk::ImageView,
+    layers: Vec<vk::ImageView>,
     allocation: ManuallyDrop<Allocation>,
     gpu: Arc<Gpu>,
 }
@@ -45,6 +46,7 @@ impl DeviceImage {
         let mut image = Self {
             raw,
             view: vk::ImageView::null(),
+            layers: Vec::new(),
             allocation: ManuallyDrop::new(allocation),
             gpu: gpu.clone(),
         };
@@ -56,10 +58,30 @@ impl DeviceImage {
             .view_type(view_type)
             .format(info.format)
             .subresource_range(vk::ImageSubresourceRange { aspect_mask: aspect, ..whole() });
-        // SAFETY: the view covers the image that was just made.
-        image.view = unsafe { gpu.raw.create_image_view(&view_info, None) }
-            .map_err(|error| vulkan_error(&format!("creating the view of {name}"), error))?;
+        // SAFETY: each view covers the image that was just made, or a layer that it has.
+        let view = |info: &vk::ImageViewCreateInfo<'_>| {
+            unsafe { gpu.raw.create_image_view(info, None) }
+                .map_err(|error| vulkan_error(&format!("creating the view of {name}"), error))
+        };
+        image.view = view(&view_info)?;
+        if info.array_layers > 1 {
+            for layer in 0..info.array_layers {
+                let range = vk::ImageSubresourceRange {
+                    aspect_mask: aspect,
+                    base_array_layer: layer,
+                    layer_count: 1,
+                    ..whole()
+                };
+                let of_layer = view_info.view_type(vk::ImageViewType::TYPE_2D).subresource_range(range);
+                image.layers.push(view(&of_layer)?);
+            }
+        }
         Ok(image)
+    }
+
+    /// One view a layer.
+    pub(super) fn layers(&self) -> &[vk::ImageView] {
+        if self.layers.is_empty() { std::slice::from_ref(&self.view) } else { &self.layers }
     }
 }
 
@@ -68,6 +90,9 @@ impl Drop for DeviceImage {
         // SAFETY: every submission that used the image was waited for; destroying a null view does nothing.
         unsafe {
             self.gpu.raw.destroy_image_view(self.view, None);
+            for &layer in &self.layers {
+                self.gpu.raw.destroy_image_view(layer, None);
+            }
             self.gpu.raw.destroy_image(self.raw, None);
             free(&self.gpu, &mut self.allocation);
         }

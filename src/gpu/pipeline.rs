@@ -98,7 +98,7 @@ impl Pipeline {
             textures: info.textures.to_vec(),
             push_constant_bytes: info.push_constant_bytes,
             format: target.format,
-            attachments: target.images.len(),
+            attachments: target.attachments(),
             nearest,
             gpu: gpu.clone(),
             not_shared: PhantomData,
@@ -149,7 +149,7 @@ impl Pipeline {
                 alpha_blend_op: vk::BlendOp::ADD,
                 color_write_mask: vk::ColorComponentFlags::RGBA,
             };
-            target.images.len()
+            target.attachments()
         ];
         let blending = vk::PipelineColorBlendStateCreateInfo::default().attachments(&blends);
         let depth = vk::PipelineDepthStencilStateCreateInfo::default()
@@ -238,10 +238,10 @@ impl Pipeline {
             .chain(draw.textures.iter().map(|(_, texture)| texture.gpu()))
             .chain([&draw.target.gpu]);
         assert!(devices.into_iter().all(|gpu| Arc::ptr_eq(gpu, &self.gpu)), "objects of several devices");
-        assert_eq!((draw.target.format, draw.target.images.len()), (self.format, self.attachments));
+        assert_eq!((draw.target.format, draw.target.attachments()), (self.format, self.attachments));
         assert_eq!(draw.target.depth.is_some(), self.nearest, "a target for the other kind of pipeline");
         for (_, texture) in draw.textures {
-            if let Sampled::Picture(picture, _) = texture {
+            if let Sampled::Picture(picture) = texture {
                 assert!(picture.sampler != vk::Sampler::null(), "a target that shaders cannot read");
                 assert!(!std::ptr::eq(*picture, draw.target), "a target that is read while it is drawn");
             }

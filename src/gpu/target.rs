@@ -17,6 +17,7 @@ use crate::{Error, Result};
 pub struct Target {
     pub(super) width: u32,
     pub(super) height: u32,
+    /// For the host one for each attachment; for shaders a single one, with a layer for each.
     pub(super) images: Vec<DeviceImage>,
     /// That the nearest of several surfaces is kept by.
     pub(super) depth: Option<DeviceImage>,
@@ -58,16 +59,17 @@ impl Target {
     /// [`Error::OutOfMemory`].
     ///
     /// # Panics
-    /// Where there are no attachments, or more than the device draws into at once.
+    /// Where there are no attachments.
     pub fn new(gpu: &Arc<Gpu>, width: u32, height: u32, attachments: usize) -> Result<Self> {
         let (format, bytes) = Self::check(gpu, "the picture", [width, height], attachments, ReadBy::Host)?;
-        let mut target = Self::empty(gpu, "the picture", format, [width, height], attachments)?;
+        let mut target = Self::empty(gpu, "the picture", format, [width, height], [attachments, 1])?;
         target.readbacks =
             (0..attachments).map(|_| Buffer::readback(gpu, "the picture", bytes)).collect::<Result<_>>()?;
         target.finish()
     }
 
-    /// The same for shaders, which read it texel by texel; `nearest` keeps of several surfaces the nearest.
+    /// The same for shaders, which read it texel by texel: an array of pictures where there are several attachments. `nearest` keeps of
+    /// several surfaces the nearest.
     ///
     /// # Errors
     /// As [`Target::new`], and [`Error::Device`] where the device has no such format.
@@ -82,7 +84,7 @@ impl Target {
         nearest: bool,
     ) -> Result<Self> {
         let (format, _) = Self::check(gpu, name, [width, height], attachments, ReadBy::Shaders { nearest })?;
-        let mut target = Self::empty(gpu, name, format, [width, height], attachments)?;
+        let mut target = Self::empty(gpu, name, format, [width, height], [1, attachments])?;
         if nearest {
             let features = vk::FormatFeatureFlags::DEPTH_STENCIL_ATTACHMENT;
             if !gpu.supports(DEPTH_FORMAT, features) {
@@ -90,7 +92,7 @@ impl Target {
                 return Err(Error::Device { message, help: None });
             }
             let usage = vk::ImageUsageFlags::DEPTH_STENCIL_ATTACHMENT;
-            let info = image_info(DEPTH_FORMAT, width, height, usage);
+            let info = image_info(DEPTH_FORMAT, [width, height], 1, usage);
             let aspect = vk::ImageAspectFlags::DEPTH;
             target.depth = Some(DeviceImage::new(gpu, name, &info, vk::ImageViewType::TYPE_2D, aspect)?);
         }
@@ -108,17 +110,17 @@ impl Target {
         name: &'static str,
         format: Rgba,
         [width, height]: [u32; 2],
-        attachments: usize,
+        [images, layers]: [usize; 2],
     ) -> Result<Self> {
-        assert!((1..=gpu.limits.max_color_attachments as usize).contains(&attachments));
+        let layers = u32::try_from(layers).expect("few attachments");
         let usage = vk::ImageUsageFlags::COLOR_ATTACHMENT
             | vk::ImageUsageFlags::TRANSFER_SRC
             | vk::ImageUsageFlags::SAMPLED;
-        let info = image_info(format.raw(), width, height, usage);
+        let info = image_info(format.raw(), [width, height], layers, usage);
+        let view = if layers > 1 { vk::ImageViewType::TYPE_2D_ARRAY } else { vk::ImageViewType::TYPE_2D };
         let aspect = vk::ImageAspectFlags::COLOR;
-        let images: Vec<DeviceImage> = (0..attachments)
-            .map(|_| DeviceImage::new(gpu, name, &info, vk::ImageViewType::TYPE_2D, aspect))
-            .collect::<Result<_>>()?;
+        let images: Vec<DeviceImage> =
+            (0..images).map(|_| DeviceImage::new(gpu, name, &info, view, aspect)).collect::<Result<_>>()?;
         // From here on `Drop` cleans up, null handles included.
         Ok(Self {
             width,
@@ -141,7 +143,7 @@ impl Target {
         self.clearing = render_pass(&self, true)?;
         self.continuing = render_pass(&self, false)?;
         let views: Vec<vk::ImageView> =
-            self.images.iter().chain(&self.depth).map(|image| image.view).collect();
+            self.images.iter().chain(&self.depth).flat_map(DeviceImage::layers).copied().collect();
         let framebuffer_info = vk::FramebufferCreateInfo::default()
             .render_pass(self.clearing)
             .attachments(&views)
@@ -152,6 +154,11 @@ impl Target {
         self.framebuffer = unsafe { self.gpu.raw.create_framebuffer(&framebuffer_info, None) }
             .map_err(|error| vulkan_error("creating the framebuffer", error))?;
         Ok(self)
+    }
+
+    /// How many there are.
+    pub(super) fn attachments(&self) -> usize {
+        self.images.iter().map(|image| image.layers().len()).sum()
     }
 
     /// The size in pixels.
@@ -167,6 +174,13 @@ impl Target {
         attachments: usize,
         read_by: ReadBy,
     ) -> Result<(Rgba, u64)> {
+        assert!(attachments > 0);
+        let most = gpu.limits.max_color_attachments;
+        if attachments > most as usize {
+            let message =
+                format!("{name}: {} draws into {most} images at once, not {attachments}", gpu.info().name);
+            return Err(Error::Device { message, help: None });
+        }
         if width.min(height) == 0 {
             let message = format!("{name}: {width} x {height} pixels");
             return Err(Error::Usage { message, help: Some("ask for at least one pixel a side".into()) });
@@ -229,8 +243,8 @@ impl Target {
 
 fn image_info(
     format: vk::Format,
-    width: u32,
-    height: u32,
+    [width, height]: [u32; 2],
+    layers: u32,
     usage: vk::ImageUsageFlags,
 ) -> vk::ImageCreateInfo<'static> {
     vk::ImageCreateInfo::default()
@@ -238,7 +252,7 @@ fn image_info(
         .format(format)
         .extent(vk::Extent3D { width, height, depth: 1 })
         .mip_levels(1)
-        .array_layers(1)
+        .array_layers(layers)
         .samples(vk::SampleCountFlags::TYPE_1)
         .tiling(vk::ImageTiling::OPTIMAL)
         .usage(usage)
@@ -278,12 +292,12 @@ fn render_pass(target: &Target, clears: bool) -> Result<vk::RenderPass> {
             .initial_layout(layout)
             .final_layout(kept)
     };
-    let mut descriptions = vec![description(target.format.raw(), read_layout); target.images.len()];
+    let mut descriptions = vec![description(target.format.raw(), read_layout); target.attachments()];
     let depth_layout = vk::ImageLayout::DEPTH_STENCIL_ATTACHMENT_OPTIMAL;
     if target.depth.is_some() {
         descriptions.push(description(DEPTH_FORMAT, depth_layout));
     }
-    let count = u32::try_from(target.images.len()).expect("few attachments");
+    let count = u32::try_from(target.attachments()).expect("few attachments");
     let references: Vec<vk::AttachmentReference> = (0..count)
         .map(|attachment| vk::AttachmentReference {
             attachment,

@@ -92,7 +92,7 @@ struct Footprint {
     edges: [Line; 3],
     /// For each edge `-1 / x`: times the rest of the function it is the column where the edge is crossed.
     edge_columns: [f64; 3],
-    /// Whether an edge runs along the rows, and is crossed nowhere.
+    /// Whether an edge runs along the rows: it is crossed nowhere, or where no number says.
     is_level: bool,
     /// Inverse depth, in front of the eye inside.
     inverse_depth: Line,
@@ -149,7 +149,7 @@ impl Footprint {
         let edges = [q.cross(r), r.cross(p), p.cross(q)].map(|normal| Line::new(normal, pixel, eye_side));
         let inverse_depth = Line::new(normal, pixel, distance.recip());
         let edge_columns = edges.map(|edge| -edge.x.recip());
-        let is_level = edges.iter().any(|edge| edge.x == 0.0);
+        let is_level = edge_columns.iter().any(|per_value| !per_value.is_finite());
         Some(Self {
             edges,
             edge_columns,
@@ -171,6 +171,7 @@ impl Footprint {
             low = if edge.x > 0.0 { low.max(crossing) } else { low };
             high = if edge.x < 0.0 { high.min(crossing) } else { high };
         }
+        // Both faces on an edge find the same crossing, bit for bit: where neither tests, both agree on whose a sample is.
         let clamped = |span: Range<u32>| {
             let start = span.start.max(self.columns.start) as usize;
             start..(span.end.min(self.columns.end) as usize).max(start)
@@ -370,19 +371,21 @@ impl Band {
         let Self { raster, begins, spans, here, crossings } = self;
         for row in begins.chunks_exact(raster.width) {
             here.clear();
-            let mut x = 0;
+            let (mut x, mut end) = (0, 0);
             while x < row.len() {
-                here.retain(|span| span.end as usize > x);
-                let mut begin = row[x];
-                while let Some(span) = spans.get(begin as usize) {
-                    here.push(*span);
-                    begin = span.next;
+                if x == end {
+                    here.retain(|span| span.end as usize > x);
+                    let mut begin = row[x];
+                    while let Some(span) = spans.get(begin as usize) {
+                        here.push(*span);
+                        begin = span.next;
+                    }
+                    end = here.iter().map(|span| span.end as usize).min().unwrap_or(row.len());
+                    let begin = row[x + 1..end].iter().position(|&begin| begin != NONE);
+                    end = begin.map_or(end, |columns| x + 1 + columns);
                 }
-                let end = here.iter().map(|span| span.end as usize).min().unwrap_or(row.len());
-                let begin = row[x + 1..end].iter().position(|&begin| begin != NONE);
-                let end = begin.map_or(end, |columns| x + 1 + columns);
-
-                sort_at(here, raster.column(x));
+                let column = raster.column(x);
+                here.sort_unstable_by(|a, b| a.compare(b, column));
                 // Inverse depths are linear: what is sorted at both ends is sorted between them.
                 let last = raster.column(end - 1);
                 let is_one = here.is_sorted_by(|a, b| a.compare(b, last).is_le());
@@ -396,20 +399,11 @@ impl Band {
     }
 }
 
-/// Sorts spans front to back at a column. There are few, and most are in order already.
-fn sort_at(spans: &mut [Span], column: f64) {
-    for i in 1..spans.len() {
-        for j in (1..=i).rev() {
-            if spans[j - 1].compare(&spans[j], column).is_le() {
-                break;
-            }
-            spans.swap(j - 1, j);
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
+    use rand::{RngExt, SeedableRng};
+    use rand_pcg::Pcg64;
+
     use super::*;
     use crate::scene::Camera;
 
@@ -430,5 +424,64 @@ mod tests {
         }
         let behind = corners.map(|corner| corner * DVec3::new(1.0, 1.0, 0.0) - DVec3::Z);
         assert!(Footprint::new(&face, &behind, raster).is_none());
+    }
+
+    /// Random triangles that go through one another, some with corners on pixel centres or in one place, some behind the eye.
+    fn faces(random: &mut Pcg64, count: u32) -> (Vec<DVec3>, Vec<BoundaryFace>) {
+        let corner = |random: &mut Pcg64| {
+            let mut at = DVec3::from_array([0, 1, 2].map(|_| random.random_range(-1.0..1.0)));
+            if random.random_bool(0.3) {
+                at = (4.0 * at).round() / 4.0;
+            }
+            at * DVec3::new(8.0, 6.0, 2.0) + 1.5 * DVec3::Z
+        };
+        let vertices: Vec<DVec3> = (0..3 * count).map(|_| corner(random)).collect();
+        let face = |cell: u32| {
+            let ids = [0, 1, 2].map(|i| if cell % 5 == 4 { 3 * cell - 3 + i } else { 3 * cell + i });
+            let [p, q, r] = ids.map(|id| vertices[id as usize]);
+            let eye_side = if p.dot(q.cross(r)) > 0.0 { 1 } else { -1 };
+            BoundaryFace { vertices: ids, cell, local: 3, leaves: random.random(), eye_side }
+        };
+        let faces = (0..count).map(face).collect();
+        (vertices, faces)
+    }
+
+    #[test]
+    fn runs_hold_what_each_pixel_by_itself_meets() {
+        let mut random = Pcg64::seed_from_u64(7);
+        for (width, height, count) in [(37, 40, 30), (1, 20, 30), (64, 3, 8), (50, 17, 0)] {
+            let camera = Camera { eye: DVec3::ZERO, target: -DVec3::Z, up: DVec3::Y, fov_y: 2.0, near: 0.1 };
+            let view = View { camera, width, height, depth: false };
+            let (vertices, faces) = faces(&mut random, count);
+            // Right, down and into the picture, in place of x, y and z.
+            let world: Vec<DVec3> = vertices.iter().map(|&v| v * DVec3::new(1.0, -1.0, -1.0)).collect();
+            let abuffer = ABuffer::new(&world, &faces, &view);
+            let raster = abuffer.raster;
+            let bands = abuffer.map_bands(
+                || (),
+                |(), band| {
+                    let mut pixels = Vec::new();
+                    band.each_run(|count, crossings| {
+                        pixels.extend(std::iter::repeat_n(crossings.to_vec(), count));
+                    });
+                    pixels
+                },
+            );
+            let mut crossed = 0;
+            for (index, found) in bands.concat().into_iter().enumerate() {
+                let (column, y) = (raster.column(index % raster.width), index / raster.width);
+                let value = |line: &Line| line.x * column + (line.y * raster.row(y) + line.constant);
+                let covers = |edge: &Line| value(edge) > 0.0 || (value(edge) == 0.0 && edge.owns_zero());
+                let met = abuffer.footprints.iter().filter(|footprint| footprint.edges.iter().all(covers));
+                let mut met: Vec<_> =
+                    met.map(|footprint| (value(&footprint.inverse_depth), footprint.crossing)).collect();
+                met.retain(|(inverse_depth, _)| *inverse_depth > 0.0);
+                met.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+                crossed += met.len();
+                let met: Vec<Crossing> = met.into_iter().map(|(_, crossing)| crossing).collect();
+                assert_eq!(found, met, "{width} x {height}, pixel {index}");
+            }
+            assert!(crossed > 2 * count as usize || count == 0, "{crossed}");
+        }
     }
 }

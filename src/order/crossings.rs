@@ -18,8 +18,8 @@ pub const BEGUN: u32 = 1 << 30;
 /// Where the rays of all pixels enter the shell and leave it.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Crossings {
-    /// For each pixel, row by row from the top, the range of its places: from the first number to before the second. Pixels whose rays
-    /// cross the same have one range.
+    /// For each pixel, row by row from the top, the range of its places: from the first number to before the second. Pixels beside one
+    /// another whose rays cross the same have one range.
     pub of_pixels: Vec<[u32; 2]>,
     /// Front to back, in each range: four times a tetrahedron, and the number of its face.
     pub places: Vec<u32>,
@@ -53,6 +53,12 @@ impl Crossings {
             all.overlapping += band.overlapping;
         }
         all
+    }
+
+    /// How often all rays cross the boundary.
+    pub fn count(&self) -> u64 {
+        let of_pixel = |&[first, last]: &[u32; 2]| u64::from(last - (first & !(BEGUN | INTRICATE)));
+        self.of_pixels.iter().map(of_pixel).sum()
     }
 
     /// Adds pixels beside one another whose rays cross the same.

@@ -16,13 +16,13 @@ use super::abuffer::{ABuffer, Crossing};
 /// Of no tetrahedron.
 const NONE: u32 = u32::MAX;
 
-/// Working memory of one thread, kept between pixels.
+/// Working memory of one thread, kept between rays.
 struct Scratch {
     /// Tetrahedra by which the ray entered, and left, the runs that it is in, and left those before them.
     entered: Vec<u32>,
     left: Vec<u32>,
     left_before: Vec<u32>,
-    /// For each tetrahedron the last one that was found in front of it: neighbouring pixels say the same.
+    /// For each tetrahedron the last one that was found in front of it: neighbouring rays say the same.
     last_front: Vec<u32>,
 }
 

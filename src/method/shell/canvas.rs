@@ -178,7 +178,7 @@ impl Shell {
             let (more_uniform_buffers, more_texel_buffers, more_textures): (&[u32], &[u32], &[u32]) =
                 match switch {
                     "LIT" => (&[5], &[3], &[9]),
-                    "SHADOWS" => (&[6], &[], &[10, 11, 12, 13]),
+                    "SHADOWS" => (&[6], &[], &[10]),
                     "SOLIDS" => (&[], &[], &[15]),
                     "SPARSE" => (&[], &[], &[22]),
                     _ => (&[], &[], &[]),

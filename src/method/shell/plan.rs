@@ -7,7 +7,8 @@ use crate::method::Choice;
 use crate::scene::{March, Scene, Skip, Traversal};
 
 /// The part of the volume that must be empty for rays to look how far they may leap: to look costs a fetch for every sample that is
-/// taken, which a lit sample, that costs far more, repays earlier.
+/// taken, which a lit sample, that costs far more, repays earlier; and so does one of a light's ray, for which the curve is kept
+/// (tube-rocks, a third of it empty: 1.2 times as fast).
 const SPARSE: f64 = 0.5;
 const SPARSE_LIT: f64 = 0.1;
 

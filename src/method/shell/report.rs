@@ -24,7 +24,7 @@ impl Shell {
                 count("tetrahedra_in_cycles", sorted.cycle_members);
             }
             Sight::Walked(crossings) => {
-                count("crossings", crossings.places.len() as u64);
+                count("crossings", crossings.count());
                 count("pixels_begun_inside", crossings.begun_inside);
                 count("pixels_overlapping", crossings.overlapping);
             }

@@ -50,8 +50,8 @@ pub struct Blocker {
 /// `MOST_PICTURES` of `glsl/include/lights.glsl`: a point light in the midst of the scene has six.
 pub const MOST_PICTURES: usize = 6 * MOST_LIGHTS;
 
-/// `CURVE_IMAGES` of `glsl/include/curve.glsl`.
-const CURVE_IMAGES: usize = 4;
+/// `PARTS` of `glsl/include/curve.glsl`.
+const PARTS: usize = 4;
 
 /// The side of a [`Tile`] in pixels: a power of two. Where many tetrahedra are seen in one, it is smaller.
 const TILE: u32 = 16;
@@ -127,7 +127,7 @@ impl Shadows {
             })
         };
         let mut shadows = Self {
-            curves: target(CURVE_IMAGES, false)?,
+            curves: target(1 + PARTS, false)?,
             blockers: if scene.solids.is_empty() { None } else { Some(target(1, true)?) },
             views,
             ranges,
@@ -161,10 +161,8 @@ impl Shadows {
 
     /// By the binding that shaders name.
     pub fn textures(&self) -> Vec<(u32, Sampled<'_>)> {
-        let curves =
-            (0..CURVE_IMAGES).map(|image| (10 + image as u32, Sampled::Picture(&self.curves, image)));
-        let blockers = self.blockers.iter().map(|target| (14, Sampled::Picture(target, 0)));
-        curves.chain(blockers).collect()
+        let blockers = self.blockers.iter().map(|target| (14, Sampled::Picture(target)));
+        [(10, Sampled::Picture(&self.curves))].into_iter().chain(blockers).collect()
     }
 
     /// The pictures, for points in world space around `eye` in parts of `unit`: as many of each light, the last of which may hold
@@ -492,8 +490,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn host_and_shader_agree_on_the_images_of_a_curve() {
+    fn host_and_shader_agree_on_the_pictures_of_a_curve() {
         let shader = include_str!("../../../glsl/include/curve.glsl");
-        assert!(shader.contains(&format!("const uint CURVE_IMAGES = {CURVE_IMAGES};")));
+        assert!(shader.contains(&format!("const uint PARTS = {PARTS};")));
     }
 }

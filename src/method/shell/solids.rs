@@ -29,6 +29,9 @@ pub struct Triangle {
     pub colour: [f32; 4],
 }
 
+/// The side of the squares in which solids are lit, in pixels.
+const SQUARE: u32 = 64;
+
 /// What does not depend on the view: a texture for each solid.
 pub struct Solids {
     textures: Vec<Texture3d>,
@@ -71,9 +74,9 @@ pub fn have_same_textures(a: &[Solid], b: &[Solid]) -> bool {
 pub struct SolidView {
     /// Which triangle is the nearest in each pixel, and its depth.
     nearest: Target,
-    find: Pipeline,
+    solid: Pipeline,
     colours: Target,
-    light: Pipeline,
+    surface: Pipeline,
 }
 
 impl SolidView {
@@ -84,9 +87,9 @@ impl SolidView {
     pub fn new(gpu: &Arc<Gpu>, view: &View, on: &[&str], constants: &[u32]) -> Result<Self> {
         let target = |nearest| Target::sampled(gpu, "the solids", [view.width, view.height], 1, nearest);
         let (nearest, colours) = (target(true)?, target(false)?);
-        let find = PipelineInfo {
-            vertex: shaders::SOLID_VERT.with(on),
-            fragment: shaders::SOLID_FRAG.with(on),
+        let solid = PipelineInfo {
+            vertex: shaders::SOLID_VERT.with(&[]),
+            fragment: shaders::SOLID_FRAG.with(&[]),
             constants: &[],
             storage_buffers: &[7],
             uniform_buffers: &[],
@@ -95,8 +98,8 @@ impl SolidView {
             push_constant_bytes: size_of::<ViewConstants>() as u32,
             keeps: Keeps::Nearest,
         };
-        let textures = [10, 11, 12, 13, 14, 15, 17];
-        let light = PipelineInfo {
+        let textures = [10, 14, 15, 17];
+        let surface = PipelineInfo {
             vertex: shaders::TILE_VERT.with(&[]),
             fragment: shaders::SURFACE_FRAG.with(on),
             constants,
@@ -106,13 +109,13 @@ impl SolidView {
                 (true, false) => &[5],
                 (true, true) => &[5, 6],
             },
-            textures: if on.contains(&"SHADOWS") { &textures } else { &textures[5..] },
+            textures: if on.contains(&"SHADOWS") { &textures } else { &textures[2..] },
             keeps: Keeps::Last,
-            ..find
+            ..solid
         };
-        let find = Pipeline::new(gpu, &nearest, &find)?;
-        let light = Pipeline::new(gpu, &colours, &light)?;
-        Ok(Self { nearest, find, colours, light })
+        let solid = Pipeline::new(gpu, &nearest, &solid)?;
+        let surface = Pipeline::new(gpu, &colours, &surface)?;
+        Ok(Self { nearest, solid, colours, surface })
     }
 
     /// Draws the solids: which is the nearest in each pixel, and then, once a pixel, its colour. `lights` and `shadows` are what a lit
@@ -143,16 +146,24 @@ impl SolidView {
             .into_par_iter()
             .map(|(solid, triangle)| eye.triangle(solid, triangle))
             .collect();
-        let mut first = 0;
-        let tile = |solid: &Solid| {
-            let members = [first, first + solid.mesh.triangles.len() as u32];
-            first = members[1];
-            let own = &triangles[members[0] as usize..members[1] as usize];
-            Tile { bounds: bounds(own, view), members, picture: 0, padding: 0 }
-        };
-        let tiles: Vec<Tile> = scene.solids.iter().map(tile).collect();
+        let mut tiles = Vec::new();
+        // Of each solid.
+        let mut vertices = Vec::new();
+        let mut end = 0;
+        for solid in scene.solids.iter() {
+            let members = end..end + solid.mesh.triangles.len();
+            end = members.end;
+            let first = 6 * tiles.len() as u32;
+            tiles.extend(squares(&triangles[members.clone()], view).into_iter().map(|bounds| Tile {
+                bounds,
+                members: [members.start as u32, members.end as u32],
+                picture: 0,
+                padding: 0,
+            }));
+            vertices.push(first..6 * tiles.len() as u32);
+        }
         let triangles = Buffer::storage(gpu, "the solids", &triangles)?;
-        let tiles = Buffer::storage(gpu, "the solids' bounds", &tiles)?;
+        let tiles = Buffer::storage(gpu, "where solids are", &tiles)?;
         let buffers: Vec<(u32, &Buffer)> =
             lights.iter().copied().chain([(1, &tiles), (7, &triangles)]).collect();
         let find = Draw {
@@ -161,18 +172,18 @@ impl SolidView {
             buffers: &buffers,
             textures: &[],
             push_constants: bytemuck::bytes_of(constants),
-            batches: &[Batch { pipeline: &self.find, vertices: 0..3 * first }],
+            batches: &[Batch { pipeline: &self.solid, vertices: 0..3 * end as u32 }],
             between: &|_| interrupt.check(),
         };
         draw(&find)?;
-        for (index, texture) in (0..).zip(&solids.textures) {
-            let own = [(15, Sampled::Picture(&self.nearest, 0)), (17, Sampled::Texture(texture))];
+        for (index, (texture, vertices)) in solids.textures.iter().zip(vertices).enumerate() {
+            let own = [(15, Sampled::Picture(&self.nearest)), (17, Sampled::Texture(texture))];
             let textures: Vec<_> = shadows.iter().copied().chain(own).collect();
             draw(&Draw {
                 target: &self.colours,
                 clears: index == 0,
                 textures: &textures,
-                batches: &[Batch { pipeline: &self.light, vertices: 6 * index..6 * (index + 1) }],
+                batches: &[Batch { pipeline: &self.surface, vertices }],
                 ..find
             })?;
         }
@@ -181,28 +192,42 @@ impl SolidView {
 
     /// By the binding that shaders name: depth, colour.
     pub fn textures(&self) -> [(u32, Sampled<'_>); 2] {
-        [(15, Sampled::Picture(&self.nearest, 0)), (16, Sampled::Picture(&self.colours, 0))]
+        [(15, Sampled::Picture(&self.nearest)), (16, Sampled::Picture(&self.colours))]
     }
 }
 
-/// What triangles cover of the picture, in clip space: left, top, right, bottom. All of it, where one reaches before the near plane.
-fn bounds(triangles: &[Triangle], view: &View) -> [f32; 4] {
-    let size = [view.width, view.height].map(f64::from);
-    let per_clip = size.map(|pixels| 0.5 * pixels * view.pixel_at_unit_depth());
-    let mut bounds = [f64::INFINITY, f64::INFINITY, f64::NEG_INFINITY, f64::NEG_INFINITY];
-    for [x, y, z, _] in triangles.iter().flat_map(|triangle| triangle.corners) {
-        if z <= 0.0 {
-            return [-1.0, -1.0, 1.0, 1.0];
-        }
-        for (axis, place) in [x, -y].into_iter().enumerate() {
-            let place = f64::from(place) / f64::from(z) / per_clip[axis];
-            // A pixel more than rounding can be off.
-            let pixel = 2.0 / size[axis];
-            bounds[axis] = bounds[axis].min(place - pixel);
-            bounds[axis + 2] = bounds[axis + 2].max(place + pixel);
+/// Squares of the picture, in clip space (left, top, right, bottom), in which any of these triangles may be seen: all of them where one
+/// reaches behind the eye. lavapipe lights also what it discards, and what a submission draws must take no longer than is waited for.
+fn squares(triangles: &[Triangle], view: &View) -> Vec<[f32; 4]> {
+    let size = [view.width, view.height];
+    let count = size.map(|pixels| pixels.div_ceil(SQUARE) as usize);
+    let mut is_seen = vec![false; count[0] * count[1]];
+    for triangle in triangles {
+        let [across, down] = [0, 1].map(|axis| {
+            let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+            for corner in triangle.corners {
+                let [x, y, z, _] = corner.map(f64::from);
+                if z <= 0.0 {
+                    (low, high) = (f64::NEG_INFINITY, f64::INFINITY);
+                    break;
+                }
+                let pixel = 0.5 * f64::from(size[axis]) + [x, -y][axis] / z / view.pixel_at_unit_depth();
+                (low, high) = (low.min(pixel), high.max(pixel));
+            }
+            // A pixel more on either side than corners in f32 can be off. Casts saturate.
+            let square = |pixel: f64| ((pixel / f64::from(SQUARE)).max(0.0) as usize).min(count[axis]);
+            square(low - 1.0)..square(high + 1.0 + f64::from(SQUARE))
+        });
+        for row in down {
+            is_seen[row * count[0]..][across.clone()].fill(true);
         }
     }
-    bounds.map(|place| place.clamp(-1.0, 1.0) as f32)
+    let clip = |square: usize, axis: usize| {
+        (2.0 * (square * SQUARE as usize) as f64 / f64::from(size[axis]) - 1.0) as f32
+    };
+    let seen = is_seen.iter().enumerate().filter(|(_, is_seen)| **is_seen);
+    let squares = seen.map(|(index, _)| [index % count[0], index / count[0]]);
+    squares.map(|[x, y]| [clip(x, 0), clip(y, 1), clip(x + 1, 0), clip(y + 1, 1)]).collect()
 }
 
 struct Eye {
@@ -253,5 +278,36 @@ impl Eye {
                 .extend((solid.texels_per_unit(triangle) * self.unit) as f32)
                 .to_array(),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::Camera;
+
+    fn triangle(corners: [[f32; 3]; 3]) -> Triangle {
+        Triangle { corners: corners.map(|[x, y, z]| [x, y, z, 0.0]), ..Triangle::zeroed() }
+    }
+
+    #[test]
+    fn squares_are_those_that_triangles_may_be_seen_in() {
+        let camera = Camera { eye: DVec3::ZERO, target: -DVec3::Z, up: DVec3::Y, fov_y: 1.0, near: 0.1 };
+        let view = View { camera, width: 130, height: 64, depth: false };
+        // In the picture's middle, a pixel wide: columns 64.5 to 65.5 of 130.
+        let half = 0.5 * view.pixel_at_unit_depth() as f32;
+        let small = triangle([[-half, 0.0, 1.0], [half, 0.0, 1.0], [0.0, half, 1.0]]);
+        let [left, middle] = [[-1.0, -1.0, -1.0 / 65.0, 1.0], [-1.0 / 65.0, -1.0, 63.0 / 65.0, 1.0]];
+        let near = |a: &[[f32; 4]], b: &[[f32; 4]]| {
+            a.len() == b.len()
+                && a.iter().flatten().zip(b.iter().flatten()).all(|(a, b)| (a - b).abs() < 1e-6)
+        };
+        assert!(near(&squares(&[small], &view), &[left, middle]));
+        let right = triangle([[0.1, 0.0, 1.0], [0.2, 0.0, 1.0], [0.1, 0.1, 1.0]]);
+        assert!(near(&squares(&[right], &view), &[middle]));
+        let behind = triangle([[0.1, 0.0, 1.0], [0.2, 0.0, 1.0], [0.1, 0.1, -1.0]]);
+        assert_eq!(squares(&[behind], &view).len(), 3);
+        let beside = triangle([[9.0, 0.0, 1.0], [9.1, 0.0, 1.0], [9.0, 0.1, 1.0]]);
+        assert!(squares(&[beside], &view).is_empty() && squares(&[], &view).is_empty());
     }
 }
