@@ -100,6 +100,14 @@ fn levels_that_nothing_reads_do_not_count() {
     let told = "all is magnified: no level of detail but 0 is compiled in";
     assert!(with.0.report.skipped.iter().any(|skipped| skipped == told), "{:?}", with.0.report.skipped);
     assert_eq!(difference([&with.0, &without.0]), 0.0);
+    // Near the poles texels are ever smaller, elsewhere none is smaller than a pixel.
+    for name in ["fur-sphere", "lit-fur"] {
+        let [with, without] = with_and_without(Skip::Levels, &load(name, &["image.size=[400, 330]"]));
+        let told = |skipped: &String| skipped.starts_with("in ") && skipped.contains(" of 42 squares");
+        assert!(with.0.report.skipped.iter().any(told), "{:?}", with.0.report.skipped);
+        assert!(!without.0.report.skipped.iter().any(told));
+        assert_eq!(difference([&with.0, &without.0]), 0.0, "{name}");
+    }
 }
 
 #[test]

@@ -205,14 +205,19 @@ fn submit_part(
             gpu.raw.cmd_begin_render_pass(commands, &begin, vk::SubpassContents::INLINE);
             gpu.raw.cmd_set_viewport(commands, 0, &[viewport]);
             gpu.raw.cmd_set_scissor(commands, 0, &[area]);
+            let mut bound = None;
             for Batch { pipeline, vertices } in batches {
                 let raw = &gpu.raw;
-                raw.cmd_bind_pipeline(commands, vk::PipelineBindPoint::GRAPHICS, pipeline.raw);
-                let sets = [pipeline.set];
-                let graphics = vk::PipelineBindPoint::GRAPHICS;
-                raw.cmd_bind_descriptor_sets(commands, graphics, pipeline.layout, 0, &sets, &[]);
-                let stages = vk::ShaderStageFlags::VERTEX | vk::ShaderStageFlags::FRAGMENT;
-                raw.cmd_push_constants(commands, pipeline.layout, stages, 0, draw.push_constants);
+                // Drivers that are asked to bind what is bound do it all again.
+                if bound != Some(pipeline.raw) {
+                    bound = Some(pipeline.raw);
+                    raw.cmd_bind_pipeline(commands, vk::PipelineBindPoint::GRAPHICS, pipeline.raw);
+                    let sets = [pipeline.set];
+                    let graphics = vk::PipelineBindPoint::GRAPHICS;
+                    raw.cmd_bind_descriptor_sets(commands, graphics, pipeline.layout, 0, &sets, &[]);
+                    let stages = vk::ShaderStageFlags::VERTEX | vk::ShaderStageFlags::FRAGMENT;
+                    raw.cmd_push_constants(commands, pipeline.layout, stages, 0, draw.push_constants);
+                }
                 raw.cmd_draw(commands, vertices.len() as u32, 1, vertices.start, 0);
             }
             gpu.raw.cmd_end_render_pass(commands);

@@ -175,12 +175,6 @@ impl Target {
         read_by: ReadBy,
     ) -> Result<(Rgba, u64)> {
         assert!(attachments > 0);
-        let most = gpu.limits.max_color_attachments;
-        if attachments > most as usize {
-            let message =
-                format!("{name}: {} draws into {most} images at once, not {attachments}", gpu.info().name);
-            return Err(Error::Device { message, help: None });
-        }
         if width.min(height) == 0 {
             let message = format!("{name}: {width} x {height} pixels");
             return Err(Error::Usage { message, help: Some("ask for at least one pixel a side".into()) });
@@ -229,6 +223,12 @@ impl Target {
             }
         };
         gpu.check_memory(name, all + besides)?;
+        let most = gpu.limits.max_color_attachments;
+        if attachments > most as usize {
+            let message =
+                format!("{name}: {} draws into {most} images at once, not {attachments}", gpu.info().name);
+            return Err(Error::Device { message, help: None });
+        }
         Ok((format, bytes))
     }
 

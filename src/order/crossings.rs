@@ -57,8 +57,16 @@ impl Crossings {
 
     /// How often all rays cross the boundary.
     pub fn count(&self) -> u64 {
-        let of_pixel = |&[first, last]: &[u32; 2]| u64::from(last - (first & !(BEGUN | INTRICATE)));
-        self.of_pixels.iter().map(of_pixel).sum()
+        self.of_pixels.iter().map(|range| u64::from(Self::length(range))).sum()
+    }
+
+    /// Whether a pixel's ray crosses the boundary, by its range.
+    pub fn are_some(range: &[u32; 2]) -> bool {
+        Self::length(range) > 0
+    }
+
+    fn length([first, last]: &[u32; 2]) -> u32 {
+        last - (first & !(BEGUN | INTRICATE))
     }
 
     /// Adds pixels beside one another whose rays cross the same.

@@ -33,6 +33,8 @@ enum Medium {
     },
     Walked {
         pipeline: Pipeline,
+        /// For squares in which all is magnified, where others are not.
+        magnified: Option<Pipeline>,
         /// For rays that are in several parts of the shell at once, where there are any.
         together: Option<Pipeline>,
         rays: RayBuffers,
@@ -58,6 +60,11 @@ impl Canvas {
         buffers
     }
 
+    /// Whether squares in which all is magnified are drawn by themselves.
+    pub(super) fn is_parted(&self) -> bool {
+        self.kind.partly_magnified
+    }
+
     /// What is drawn of the medium, in order.
     pub(super) fn batches(&self, seen: &Seen) -> Vec<Batch<'_>> {
         match &self.medium {
@@ -71,10 +78,22 @@ impl Canvas {
                 };
                 seen.runs.iter().map(batch).collect()
             }
-            Medium::Walked { pipeline, together, .. } => {
-                let vertices = 0..walk::vertices([self.kind.width, self.kind.height]);
-                let pipelines = [Some(pipeline), together.as_ref()].into_iter().flatten();
-                pipelines.map(|pipeline| Batch { pipeline, vertices: vertices.clone() }).collect()
+            Medium::Walked { pipeline, magnified, together, .. } => {
+                let end = 6 * seen.minified_squares.len() as u32;
+                let mut batches = match magnified {
+                    None => vec![Batch { pipeline, vertices: 0..end }],
+                    Some(magnified) => {
+                        let batch = |(&minified, vertices): (&bool, _)| Batch {
+                            pipeline: if minified { pipeline } else { magnified },
+                            vertices,
+                        };
+                        walk::vertices(&seen.minified_squares).map(batch).collect()
+                    }
+                };
+                // Squares do not overlap: those of one pipeline are drawn together.
+                batches.sort_by_key(|batch| std::ptr::eq(batch.pipeline, pipeline));
+                batches.extend(together.iter().map(|pipeline| Batch { pipeline, vertices: 0..end }));
+                batches
             }
         }
     }
@@ -89,6 +108,8 @@ pub(super) struct CanvasKind {
     /// Whether anything is resolved pixel by pixel.
     cycles: bool,
     walks: bool,
+    /// Whether there are squares in which all is magnified, and others.
+    partly_magnified: bool,
     /// What is compiled into the shaders: what the scene has, and what is asked for.
     switches: Vec<&'static str>,
     /// Their specialisation constants.
@@ -162,6 +183,12 @@ impl Shell {
                 Sight::Walked(crossings) => crossings.overlapping > 0,
             },
             walks: matches!(sight, Sight::Walked(_)),
+            partly_magnified: match sight {
+                Sight::Walked(crossings) if skips.allow(Skip::Levels) => {
+                    seen.is_worth_parting(crossings, view)
+                }
+                _ => false,
+            },
             switches: switches.into_iter().filter_map(|(name, is_on)| is_on.then_some(name)).collect(),
             constants,
         }
@@ -224,12 +251,23 @@ impl Shell {
                     ..info
                 };
                 let pipeline = Pipeline::new(&self.gpu, &target, &walked)?;
+                let mut constants = kind.constants.clone();
+                constants[..3].copy_from_slice(&constants_of_volume(
+                    self.scene.march,
+                    false,
+                    &self.scene.volume,
+                ));
+                let magnified = PipelineInfo { constants: &constants, ..walked };
+                let magnified = kind
+                    .partly_magnified
+                    .then(|| Pipeline::new(&self.gpu, &target, &magnified))
+                    .transpose()?;
                 let of_several = PipelineInfo { fragment: shaders::TOGETHER_FRAG.with(on), ..walked };
                 let together = kind.cycles.then(|| Pipeline::new(&self.gpu, &target, &of_several));
                 let together = together.transpose()?;
                 let rays = RayBuffers::new(&self.gpu, crossings)?;
                 let cells = Buffer::floats(&self.gpu, "the tetrahedra", &seen.cells)?;
-                (cells, Medium::Walked { pipeline, together, rays })
+                (cells, Medium::Walked { pipeline, magnified, together, rays })
             }
         };
         let solids = self.solids.as_ref().map(|_| {

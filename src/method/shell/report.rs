@@ -1,5 +1,6 @@
 //! The report of a frame: what it counted, what it skipped and why, and what the user should know.
 
+use super::canvas::Canvas;
 use super::constants::{MOST_SAMPLES, wanted_samples};
 use super::seen::Seen;
 use super::{Shell, Sight};
@@ -65,6 +66,13 @@ impl Shell {
         }
         if !seen.minified && self.scene.skips.allow(Skip::Levels) {
             report.skipped.push("all is magnified: no level of detail but 0 is compiled in".into());
+        }
+        if self.canvas.as_ref().is_some_and(Canvas::is_parted) {
+            let magnified = seen.minified_squares.iter().filter(|minified| !**minified).count();
+            report.skipped.push(format!(
+                "in {magnified} of {} squares of 64 x 64 pixels all is magnified: no level of detail but 0 is read there",
+                seen.minified_squares.len()
+            ));
         }
         match (&self.scene.shading, &self.shadows) {
             (None, _) => report.skipped.push("the scene is unlit: nothing of light is compiled in".into()),

@@ -1,5 +1,6 @@
 //! What rays need that walk by adjacency (`glsl/walk.frag.glsl`): where they enter the shell, and what lies beyond each face.
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use crate::Result;
@@ -9,7 +10,7 @@ use crate::order::relations::FaceTable;
 use crate::shell::{Shell, Topology};
 
 /// The side of the squares in which the picture is drawn, in pixels: `SIDE` of `glsl/walk.vert.glsl`.
-const SIDE: u32 = 64;
+pub const SIDE: u32 = 64;
 
 /// In one tetrahedron, at most: a ray that passes a dozen such has nearly as many as `MOST_PASSES` of `glsl/include/walk.glsl`, and
 /// would be left to the host. Where there may be more, tetrahedra are sorted.
@@ -101,7 +102,30 @@ impl RayBuffers {
     }
 }
 
-/// How many vertices draw a picture of this size.
-pub fn vertices([width, height]: [u32; 2]) -> u32 {
-    6 * width.div_ceil(SIDE) * height.div_ceil(SIDE)
+/// How many squares a picture of this size has across, and down.
+pub fn squares(size: [u32; 2]) -> [usize; 2] {
+    size.map(|pixels| pixels.div_ceil(SIDE) as usize)
+}
+
+/// The vertices that draw squares which are alike, one range for each run of them, row by row.
+pub fn vertices<T: PartialEq>(squares: &[T]) -> impl Iterator<Item = (&T, Range<u32>)> {
+    let mut end = 0;
+    squares.chunk_by(PartialEq::eq).map(move |run| {
+        let first = end;
+        end += 6 * run.len() as u32;
+        (&run[0], first..end)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn runs_of_squares_are_drawn_together() {
+        let runs: Vec<_> = vertices(&[true, true, false, true]).collect();
+        assert_eq!(runs, [(&true, 0..12), (&false, 12..18), (&true, 18..24)]);
+        assert_eq!(vertices::<bool>(&[]).count(), 0);
+        assert_eq!(squares([64, 65]), [1, 2]);
+    }
 }
