@@ -58,8 +58,8 @@ impl DeviceImage {
             .view_type(view_type)
             .format(info.format)
             .subresource_range(vk::ImageSubresourceRange { aspect_mask: aspect, ..whole() });
-        // SAFETY: each view covers the image that was just made, or a layer that it has.
         let view = |info: &vk::ImageViewCreateInfo<'_>| {
+            // SAFETY: each view covers the image that was just made, or a layer that it has.
             unsafe { gpu.raw.create_image_view(info, None) }
                 .map_err(|error| vulkan_error(&format!("creating the view of {name}"), error))
         };

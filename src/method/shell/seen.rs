@@ -85,7 +85,7 @@ pub struct Seen {
     pub beside: u64,
     /// Whether any level of detail but 0 is needed.
     pub minified: bool,
-    /// The same of each of [`walk::squares`], row by row; empty where tetrahedra are sorted.
+    /// The same of each square of 64 x 64 pixels, row by row; empty where tetrahedra are sorted.
     pub minified_squares: Vec<bool>,
     /// The unit of all lengths on the device, in world units: how far the shell reaches from the eye.
     pub unit: f64,
