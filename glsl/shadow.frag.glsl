@@ -90,7 +90,7 @@ bool follow(vec3 origin, vec3 ray, out float optical, out float end_depth) {
                 if (spans[hit].y <= z) continue;
                 path = path_from(cells[hits[hit]].texture, origin, ray, light.pixel, is_parallel);
                 Steps alone = steps_of(path, vec2(z, next));
-                if (present == 0 || alone.count > steps.count) steps = alone;
+                if (alone.count > steps.count) steps = alone;
                 present++;
             }
             passes += AT_ONCE * (end - first + 2) * (steps.count + 3);

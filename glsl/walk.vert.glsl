@@ -4,7 +4,7 @@
 
 #include "shell.glsl"
 
-const uint SIDE = 64; // as in src/method/shell/walk.rs
+const uint SIDE = 64; // as in src/method/shell/squares.rs
 
 const uint CORNERS[6] = uint[](0, 1, 2, 0, 2, 3);
 

@@ -23,6 +23,8 @@ pub struct Crossings {
     pub of_pixels: Vec<[u32; 2]>,
     /// Front to back, in each range: four times a tetrahedron, and the number of its face.
     pub places: Vec<u32>,
+    /// How often the rays of all pixels cross the boundary.
+    pub count: u64,
     /// Pixels whose ray begins in the shell.
     pub begun_inside: u64,
     /// Pixels whose ray is in two parts of the shell at once.
@@ -49,24 +51,16 @@ impl Crossings {
             let before = all.places.len() as u32;
             all.of_pixels.extend(band.of_pixels.iter().map(|range| range.map(|place| before + place)));
             all.places.extend(band.places);
+            all.count += band.count;
             all.begun_inside += band.begun_inside;
             all.overlapping += band.overlapping;
         }
         all
     }
 
-    /// How often all rays cross the boundary.
-    pub fn count(&self) -> u64 {
-        self.of_pixels.iter().map(|range| u64::from(Self::length(range))).sum()
-    }
-
     /// Whether a pixel's ray crosses the boundary, by its range.
-    pub fn are_some(range: &[u32; 2]) -> bool {
-        Self::length(range) > 0
-    }
-
-    fn length([first, last]: &[u32; 2]) -> u32 {
-        last - (first & !(BEGUN | INTRICATE))
+    pub fn are_some([first, last]: &[u32; 2]) -> bool {
+        first & !(BEGUN | INTRICATE) < *last
     }
 
     /// Adds pixels beside one another whose rays cross the same.
@@ -84,7 +78,9 @@ impl Crossings {
         let flags = if begins_inside { BEGUN } else { 0 } | if overlaps { INTRICATE } else { 0 };
         let range = [first | flags, self.places.len() as u32];
         self.of_pixels.extend(std::iter::repeat_n(range, pixels));
-        self.begun_inside += if begins_inside { pixels as u64 } else { 0 };
-        self.overlapping += if overlaps { pixels as u64 } else { 0 };
+        let pixels = pixels as u64;
+        self.count += pixels * crossings.len() as u64;
+        self.begun_inside += if begins_inside { pixels } else { 0 };
+        self.overlapping += if overlaps { pixels } else { 0 };
     }
 }

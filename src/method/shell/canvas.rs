@@ -4,6 +4,7 @@ use super::constants::{ViewConstants, constants_of_volume};
 use super::lit::{self, LitView, Sight as LitSight};
 use super::seen::{Run, Seen};
 use super::solids::SolidView;
+use super::squares;
 use super::walk::{self, RayBuffers, Ways};
 use super::{Shell, Sight};
 use crate::gpu::{Batch, Buffer, Keeps, Pipeline, PipelineInfo, Target, shaders};
@@ -87,7 +88,7 @@ impl Canvas {
                             pipeline: if minified { pipeline } else { magnified },
                             vertices,
                         };
-                        walk::vertices(&seen.minified_squares).map(batch).collect()
+                        squares::vertices(&seen.minified_squares).map(batch).collect()
                     }
                 };
                 // Squares do not overlap: those of one pipeline are drawn together.

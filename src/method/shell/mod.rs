@@ -18,6 +18,7 @@ mod report;
 pub mod seen;
 pub mod shadows;
 pub mod solids;
+mod squares;
 mod update;
 mod volume;
 mod walk;

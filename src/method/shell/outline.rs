@@ -8,6 +8,8 @@
 
 use glam::{DVec2, DVec3};
 
+use crate::scene::View;
+
 /// Pinhole projection of view space (x right, y up, z depth) to pixels (x right, y down).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Projection {
@@ -41,6 +43,12 @@ const SHARPEST: f64 = 0.1;
 const FARTHEST: f64 = 4.0;
 
 impl Projection {
+    /// To the picture of a view, with this margin.
+    pub fn new(view: &View, margin: f64) -> Self {
+        let centre = 0.5 * DVec2::new(f64::from(view.width), f64::from(view.height));
+        Self { centre, pixel: view.pixel_at_unit_depth(), near: view.camera.near, margin }
+    }
+
     /// Where a point beyond the near plane is seen.
     pub fn project(&self, point: DVec3) -> DVec2 {
         self.centre + DVec2::new(point.x, -point.y) / (point.z * self.pixel)

@@ -25,7 +25,7 @@ impl Shell {
                 count("tetrahedra_in_cycles", sorted.cycle_members);
             }
             Sight::Walked(crossings) => {
-                count("crossings", crossings.count());
+                count("crossings", crossings.count);
                 count("pixels_begun_inside", crossings.begun_inside);
                 count("pixels_overlapping", crossings.overlapping);
             }

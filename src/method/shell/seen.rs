@@ -11,7 +11,7 @@ use glam::{DMat3, DVec2, DVec3};
 use rayon::prelude::*;
 
 use super::outline::{Projection, Unseen};
-use super::walk;
+use super::squares::{SIDE, Squares};
 use crate::order::{Crossings, Order, Sorted};
 use crate::scene::{Scene, View};
 
@@ -120,8 +120,8 @@ impl Seen {
         let mut seen = Self::begun(&eye, spare);
         seen.cells.resize(scene.shell.topology.tetrahedra.len(), Cell::zeroed());
         let cells = seen.cells.par_iter_mut().enumerate().with_min_len(TASK);
-        let [across, down] = walk::squares([view.width, view.height]);
-        let minified: Vec<AtomicBool> = (0..across * down).map(|_| AtomicBool::new(false)).collect();
+        let squares = Squares::of(view);
+        let minified: Vec<AtomicBool> = (0..squares.count()).map(|_| AtomicBool::new(false)).collect();
         let mapped = cells.map(|(t, cell)| {
             if !scene.shell.has_maps(t) {
                 *cell = Cell::zeroed(); // a ray that comes here ends
@@ -129,11 +129,10 @@ impl Seen {
             }
             let vertices = eye.vertices(t);
             if eye.fill(t, &vertices.map(|vertex| vertex.position), cell) {
-                let [columns, rows] = eye.squares(&vertices, [across, down]);
-                for row in rows {
-                    for square in &minified[row * across..][columns.clone()] {
-                        square.store(true, Ordering::Relaxed);
-                    }
+                let before_near = |vertex: Vertex| vertex.position.z <= eye.projection.near;
+                let corners = vertices.map(|vertex| (!before_near(vertex)).then_some(vertex.pixel));
+                for square in squares.around(corners) {
+                    minified[square].store(true, Ordering::Relaxed);
                 }
             }
             1
@@ -228,8 +227,8 @@ impl Seen {
         if !self.minified || !self.minified_squares.contains(&false) {
             return false;
         }
-        let [across, _] = walk::squares([view.width, view.height]);
-        let side = walk::SIDE as usize;
+        let across = Squares::of(view).across();
+        let side = SIDE as usize;
         let (mut covered, mut magnified) = (0, 0);
         for (y, row) in crossings.of_pixels.chunks_exact(view.width as usize).enumerate() {
             let squares = &self.minified_squares[y / side * across..];
@@ -282,14 +281,9 @@ struct Vertex {
 
 impl<'a> Eye<'a> {
     fn new(scene: &'a Scene, view: &View, subpixels: u32) -> Self {
-        let projection = Projection {
-            centre: 0.5 * DVec2::new(f64::from(view.width), f64::from(view.height)),
-            pixel: view.pixel_at_unit_depth(),
-            near: view.camera.near,
-            // Snapping moves an edge by at most half a subpixel diagonally; corners in f32, at most `FARTHEST` pictures away,
-            // are off by less than another half up to pictures of 2^13 pixels.
-            margin: 2.0 / f64::from(subpixels),
-        };
+        // Snapping moves an edge by at most half a subpixel diagonally; corners in f32, at most `FARTHEST` pictures away,
+        // are off by less than another half up to pictures of 2^13 pixels.
+        let projection = Projection::new(view, 2.0 / f64::from(subpixels));
         let eye = view.camera.eye;
         let view_from_world = view.camera.frame().view_from_world();
         let vertex = |&vertex: &DVec3| {
@@ -308,23 +302,6 @@ impl<'a> Eye<'a> {
 
     fn vertices(&self, t: usize) -> [Vertex; 4] {
         self.scene.shell.topology.tetrahedra[t].map(|id| self.vertices[id as usize])
-    }
-
-    /// The [`walk::squares`], of so many across and down, in which a tetrahedron may be seen: all, where it reaches before the near
-    /// plane.
-    fn squares(&self, vertices: &[Vertex; 4], count: [usize; 2]) -> [Range<usize>; 2] {
-        if vertices.iter().any(|vertex| vertex.position.z <= self.projection.near) {
-            return count.map(|count| 0..count);
-        }
-        let pixels = vertices.map(|vertex| vertex.pixel);
-        let low = pixels.into_iter().fold(DVec2::INFINITY, DVec2::min);
-        let high = pixels.into_iter().fold(DVec2::NEG_INFINITY, DVec2::max);
-        [0, 1].map(|axis| {
-            // A pixel more on either side than rays in f32 can be off. Casts saturate.
-            let square = |pixel: f64| (pixel / f64::from(walk::SIDE)).max(0.0) as usize;
-            square(low[axis] - 1.0).min(count[axis])
-                ..square(high[axis] + 1.0 + f64::from(walk::SIDE)).min(count[axis])
-        })
     }
 
     /// The least depth of a vertex, in world units.

@@ -7,7 +7,9 @@ use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
 use super::ViewConstants;
+use super::outline::Projection;
 use super::seen::Tile;
+use super::squares::Squares;
 use crate::Result;
 use crate::gpu::{
     Batch, Buffer, Draw, Gpu, Keeps, Pipeline, PipelineInfo, Sampled, Target, Texture3d, draw, shaders,
@@ -28,9 +30,6 @@ pub struct Triangle {
     pub facing: [f32; 4],
     pub colour: [f32; 4],
 }
-
-/// The side of the squares in which solids are lit, in pixels.
-const SQUARE: u32 = 64;
 
 /// What does not depend on the view: a texture for each solid.
 pub struct Solids {
@@ -154,12 +153,9 @@ impl SolidView {
             let members = end..end + solid.mesh.triangles.len();
             end = members.end;
             let first = 6 * tiles.len() as u32;
-            tiles.extend(squares(&triangles[members.clone()], view).into_iter().map(|bounds| Tile {
-                bounds,
-                members: [members.start as u32, members.end as u32],
-                picture: 0,
-                padding: 0,
-            }));
+            let bounds = where_seen(&triangles[members.clone()], view);
+            let members = [members.start as u32, members.end as u32];
+            tiles.extend(bounds.map(|bounds| Tile { bounds, members, picture: 0, padding: 0 }));
             vertices.push(first..6 * tiles.len() as u32);
         }
         let triangles = Buffer::storage(gpu, "the solids", &triangles)?;
@@ -196,38 +192,22 @@ impl SolidView {
     }
 }
 
-/// Squares of the picture, in clip space (left, top, right, bottom), in which any of these triangles may be seen: all of them where one
-/// reaches behind the eye. lavapipe lights also what it discards, and what a submission draws must take no longer than is waited for.
-fn squares(triangles: &[Triangle], view: &View) -> Vec<[f32; 4]> {
-    let size = [view.width, view.height];
-    let count = size.map(|pixels| pixels.div_ceil(SQUARE) as usize);
-    let mut is_seen = vec![false; count[0] * count[1]];
+/// The bounds of the [`Squares`] in which any of these triangles may be seen. lavapipe lights also what it discards, so the fewer the
+/// better.
+fn where_seen(triangles: &[Triangle], view: &View) -> impl Iterator<Item = [f32; 4]> {
+    let squares = Squares::of(view);
+    let projection = Projection::new(view, 0.0);
+    let mut is_seen = vec![false; squares.count()];
     for triangle in triangles {
-        let [across, down] = [0, 1].map(|axis| {
-            let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
-            for corner in triangle.corners {
-                let [x, y, z, _] = corner.map(f64::from);
-                if z <= 0.0 {
-                    (low, high) = (f64::NEG_INFINITY, f64::INFINITY);
-                    break;
-                }
-                let pixel = 0.5 * f64::from(size[axis]) + [x, -y][axis] / z / view.pixel_at_unit_depth();
-                (low, high) = (low.min(pixel), high.max(pixel));
-            }
-            // A pixel more on either side than corners in f32 can be off. Casts saturate.
-            let square = |pixel: f64| ((pixel / f64::from(SQUARE)).max(0.0) as usize).min(count[axis]);
-            square(low - 1.0)..square(high + 1.0 + f64::from(SQUARE))
-        });
-        for row in down {
-            is_seen[row * count[0]..][across.clone()].fill(true);
+        let project = |[x, y, z, _]: [f32; 4]| {
+            (z > 0.0).then(|| projection.project(DVec3::new(x.into(), y.into(), z.into())))
+        };
+        for square in squares.around(triangle.corners.map(project)) {
+            is_seen[square] = true;
         }
     }
-    let clip = |square: usize, axis: usize| {
-        (2.0 * (square * SQUARE as usize) as f64 / f64::from(size[axis]) - 1.0) as f32
-    };
-    let seen = is_seen.iter().enumerate().filter(|(_, is_seen)| **is_seen);
-    let squares = seen.map(|(index, _)| [index % count[0], index / count[0]]);
-    squares.map(|[x, y]| [clip(x, 0), clip(y, 1), clip(x + 1, 0), clip(y + 1, 1)]).collect()
+    let seen = is_seen.into_iter().enumerate().filter(|(_, is_seen)| *is_seen);
+    seen.map(move |(square, _)| squares.bounds(square))
 }
 
 struct Eye {
@@ -278,36 +258,5 @@ impl Eye {
                 .extend((solid.texels_per_unit(triangle) * self.unit) as f32)
                 .to_array(),
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::scene::Camera;
-
-    fn triangle(corners: [[f32; 3]; 3]) -> Triangle {
-        Triangle { corners: corners.map(|[x, y, z]| [x, y, z, 0.0]), ..Triangle::zeroed() }
-    }
-
-    #[test]
-    fn squares_are_those_that_triangles_may_be_seen_in() {
-        let camera = Camera { eye: DVec3::ZERO, target: -DVec3::Z, up: DVec3::Y, fov_y: 1.0, near: 0.1 };
-        let view = View { camera, width: 130, height: 64, depth: false };
-        // In the picture's middle, a pixel wide: columns 64.5 to 65.5 of 130.
-        let half = 0.5 * view.pixel_at_unit_depth() as f32;
-        let small = triangle([[-half, 0.0, 1.0], [half, 0.0, 1.0], [0.0, half, 1.0]]);
-        let [left, middle] = [[-1.0, -1.0, -1.0 / 65.0, 1.0], [-1.0 / 65.0, -1.0, 63.0 / 65.0, 1.0]];
-        let near = |a: &[[f32; 4]], b: &[[f32; 4]]| {
-            a.len() == b.len()
-                && a.iter().flatten().zip(b.iter().flatten()).all(|(a, b)| (a - b).abs() < 1e-6)
-        };
-        assert!(near(&squares(&[small], &view), &[left, middle]));
-        let right = triangle([[0.1, 0.0, 1.0], [0.2, 0.0, 1.0], [0.1, 0.1, 1.0]]);
-        assert!(near(&squares(&[right], &view), &[middle]));
-        let behind = triangle([[0.1, 0.0, 1.0], [0.2, 0.0, 1.0], [0.1, 0.1, -1.0]]);
-        assert_eq!(squares(&[behind], &view).len(), 3);
-        let beside = triangle([[9.0, 0.0, 1.0], [9.1, 0.0, 1.0], [9.0, 0.1, 1.0]]);
-        assert!(squares(&[beside], &view).is_empty() && squares(&[], &view).is_empty());
     }
 }

@@ -1,6 +1,5 @@
 //! What rays need that walk by adjacency (`glsl/walk.frag.glsl`): where they enter the shell, and what lies beyond each face.
 
-use std::ops::Range;
 use std::sync::Arc;
 
 use crate::Result;
@@ -8,9 +7,6 @@ use crate::gpu::{Buffer, Gpu};
 use crate::order::Crossings;
 use crate::order::relations::FaceTable;
 use crate::shell::{Shell, Topology};
-
-/// The side of the squares in which the picture is drawn, in pixels: `SIDE` of `glsl/walk.vert.glsl`.
-pub const SIDE: u32 = 64;
 
 /// In one tetrahedron, at most: a ray that passes a dozen such has nearly as many as `MOST_PASSES` of `glsl/include/walk.glsl`, and
 /// would be left to the host. Where there may be more, tetrahedra are sorted.
@@ -99,33 +95,5 @@ impl RayBuffers {
     /// By the binding that shaders name.
     pub fn buffers(&self) -> [(u32, &Buffer); 2] {
         [(20, &self.of_pixels), (21, &self.places)]
-    }
-}
-
-/// How many squares a picture of this size has across, and down.
-pub fn squares(size: [u32; 2]) -> [usize; 2] {
-    size.map(|pixels| pixels.div_ceil(SIDE) as usize)
-}
-
-/// The vertices that draw squares which are alike, one range for each run of them, row by row.
-pub fn vertices<T: PartialEq>(squares: &[T]) -> impl Iterator<Item = (&T, Range<u32>)> {
-    let mut end = 0;
-    squares.chunk_by(PartialEq::eq).map(move |run| {
-        let first = end;
-        end += 6 * run.len() as u32;
-        (&run[0], first..end)
-    })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn runs_of_squares_are_drawn_together() {
-        let runs: Vec<_> = vertices(&[true, true, false, true]).collect();
-        assert_eq!(runs, [(&true, 0..12), (&false, 12..18), (&true, 18..24)]);
-        assert_eq!(vertices::<bool>(&[]).count(), 0);
-        assert_eq!(squares([64, 65]), [1, 2]);
     }
 }
