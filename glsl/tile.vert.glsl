@@ -1,6 +1,6 @@
 #version 450
 #extension GL_ARB_shading_language_include : require
-// switches: LIGHT
+// switches: LIGHT WALKED(LIGHT)
 // A rectangle of pixels as two triangles.
 
 #include "shell.glsl"
@@ -23,5 +23,10 @@ void main() {
     uint corner = CORNERS[gl_VertexIndex % 6];
     bool right = corner == 1 || corner == 2;
     bool low = corner >= 2;
-    gl_Position = vec4(right ? tile.bounds.z : tile.bounds.x, low ? tile.bounds.w : tile.bounds.y, 0.0, 1.0);
+#ifdef WALKED
+    const float nearness = 1.0;
+#else
+    const float nearness = 0.5; // where rays walk, only what they have left is drawn then
+#endif
+    gl_Position = vec4(right ? tile.bounds.z : tile.bounds.x, low ? tile.bounds.w : tile.bounds.y, nearness, 1.0);
 }

@@ -27,6 +27,30 @@ const float FAR = 3.0e38;
 // By how much of itself a depth may be off, for rounding: 2^-18.
 const float STRAY = 3.814697265625e-6;
 
+#ifdef LIGHT
+// Where the ray starts, which is 0 for that of an eye; and what is known of its pixel.
+vec3 origin = vec3(0.0);
+float pixel_size = 0.0;
+bool is_parallel = false;
+
+float height_of(vec4 plane) {
+    return plane.w - dot(plane.xyz, origin);
+}
+
+// Whether a ray is surely on the outer side of a plane at a depth. Heights are differences of numbers up to 1, and off by parts of that.
+bool is_outside(float height, float towards_inside, float depth) {
+    return height > depth * towards_inside + STRAY;
+}
+#else
+float height_of(vec4 plane) {
+    return plane.w;
+}
+
+bool is_outside(float height, float towards_inside, float depth) {
+    return height > depth * (1.0 + STRAY) * towards_inside;
+}
+#endif
+
 vec4 plane_at(uint place) {
     return texelFetch(cells, int((place >> 2) * 9 + 2 + (place & 3)));
 }
@@ -35,15 +59,23 @@ void texture_of(uint cell, out vec4 rows[3]) {
     for (int i = 0; i < 3; i++) rows[i] = texelFetch(cells, int(cell * 9) + 6 + i);
 }
 
-// The crossings of this pixel, from `next` to before `last`: none, unless its ray is as intricate as asked. Where several pixels run at
-// once, those that are discarded may run on with the others: without crossings they soon stop.
-void crossings_of_pixel(bool intricate, out int next, out int last, out bool is_begun) {
-    int pixel = int(gl_FragCoord.y) * int(2.0 * view.centre.x) + int(gl_FragCoord.x);
-    uvec2 range = texelFetch(of_pixels, pixel).xy;
+Path path_of(uint cell, vec3 ray) {
+    vec4 rows[3];
+    texture_of(cell, rows);
+#ifdef LIGHT
+    return path_from(rows, origin, ray, pixel_size, is_parallel);
+#else
+    return path_in(rows, ray);
+#endif
+}
+
+// The crossings of a pixel, from `next` to before `last`; returns whether its ray is intricate.
+bool crossings_of(uvec2 pixel, out int next, out int last, out bool is_begun) {
+    uvec2 range = texelFetch(of_pixels, int(pixel.y * uint(2.0 * view.centre.x) + pixel.x)).xy;
     next = int(range.x & ~(INTRICATE | BEGUN));
     last = int(range.y);
     is_begun = INSIDE && (range.x & BEGUN) != 0;
-    if (((range.x & INTRICATE) != 0) != intricate) last = next;
+    return (range.x & INTRICATE) != 0;
 }
 
 // Parts of the shell may touch at faces that know nothing of one another, and rays may lie in the planes of those. Then f32 takes
@@ -70,7 +102,7 @@ Faces faces_at(uint place, vec3 ray) {
     for (uint i = 0; i < 4; i++) {
         vec4 plane = plane_at(other_face(place, i));
         faces.towards_inside[i] = dot(plane.xyz, ray);
-        faces.heights[i] = plane.w;
+        faces.heights[i] = height_of(plane);
     }
     return faces;
 }
@@ -81,7 +113,7 @@ bool enters(Faces faces, vec3 ray, out float depth) {
     bool is_late = false;
     for (uint i = 1; i < 4; i++) {
         float towards_inside = faces.towards_inside[i];
-        is_late = is_late || (towards_inside > 0.0 && faces.heights[i] > depth * (1.0 + STRAY) * towards_inside);
+        is_late = is_late || (towards_inside > 0.0 && is_outside(faces.heights[i], towards_inside, depth));
     }
     return faces.towards_inside[0] > FLAT * length(ray) && !is_late;
 }
@@ -90,8 +122,12 @@ bool enters(Faces faces, vec3 ray, out float depth) {
 bool leaves(float depth, uint exit, uint leave, vec3 ray) {
     vec4 face = plane_at(leave);
     float towards_inside = dot(face.xyz, ray);
-    return -towards_inside > FLAT * length(ray)
-        && (exit == leave || depth > face.w / towards_inside * (1.0 - STRAY));
+#ifdef LIGHT
+    bool is_beyond = depth * towards_inside < height_of(face) + STRAY;
+#else
+    bool is_beyond = depth > face.w / towards_inside * (1.0 - STRAY);
+#endif
+    return -towards_inside > FLAT * length(ray) && (exit == leave || is_beyond);
 }
 
 // Where a ray leaves the tetrahedron that it has entered by the first of these faces, and how deep; NOWHERE where rounding, or
@@ -133,4 +169,81 @@ uint back_to_start(uint place, vec3 ray, inout uint passes) {
         place = texelFetch(beyond, int(place)).x;
     }
     return place;
+}
+
+// Where a ray that walks alone is.
+struct Walker {
+    int next;     // crossing
+    int last;
+    uint place;   // where it has entered the tetrahedron that it is in; NOWHERE outside
+    float from;   // the depth to which it has come
+    bool is_done; // it has nothing before it
+    bool strays;
+};
+
+// What it passes in one tetrahedron, from the step `first` on.
+struct Stretch {
+    uint cell;
+    Path path;
+    Steps steps;
+    uint first;
+};
+
+Walker walker_at(int next, int last, bool is_begun, vec3 ray, inout uint passes) {
+    Walker walker = Walker(next, last, NOWHERE, view.near, false, false);
+    if (is_begun) {
+        walker.place = back_to_start(texelFetch(crossings, next).x & ~LEAVES, ray, passes);
+        walker.strays = walker.place == NOWHERE;
+    }
+    return walker;
+}
+
+// On to the next tetrahedron in which something may be seen, before `farthest`. Where several pixels run at once, all of them wait here
+// for one another, and march together then.
+Stretch go_on(inout Walker walker, vec3 ray, float farthest, inout uint passes) {
+    Stretch stretch;
+    stretch.cell = 0;
+    stretch.path.detail = 0.0;
+    while (passes < MOST_PASSES) {
+        passes++;
+        stretch.first = 0;
+        stretch.steps.count = 0;
+        bool is_entering = walker.place == NOWHERE;
+        if (is_entering) {
+            walker.is_done = walker.next == walker.last;
+            if (walker.is_done) break;
+            uint crossing = texelFetch(crossings, walker.next++).x;
+            if ((crossing & LEAVES) != 0) continue;
+            walker.place = crossing;
+        }
+        stretch.cell = walker.place >> 2;
+        // Of all tetrahedra alike, also where the ray goes on: to lavapipe a branch saves nothing, so that what is read here is read
+        // once for both.
+        Faces faces = faces_at(walker.place, ray);
+        if (is_entering) {
+            float depth;
+            walker.strays = walker.strays || !enters(faces, ray, depth);
+            walker.from = max(walker.from, depth);
+        }
+        float depth;
+        uint exit = exit_of(faces, depth);
+        vec2 segment = vec2(walker.from, min(depth, farthest));
+        if (exit != NOWHERE && segment.y > segment.x) {
+            stretch.path = path_of(stretch.cell, ray);
+            stretch.steps = steps_of(stretch.path, segment);
+            stretch.first = seek(stretch.path, stretch.steps, 0, passes);
+            walker.from = segment.y;
+        }
+        walker.is_done = walker.from >= farthest;
+        walker.place = exit == NOWHERE || walker.is_done ? NOWHERE : texelFetch(beyond, int(exit)).x;
+        if (walker.place == NOWHERE && !walker.is_done && walker.next < walker.last) {
+            uint leave = texelFetch(crossings, walker.next).x;
+            if ((leave & LEAVES) != 0) {
+                walker.next++;
+                walker.strays = walker.strays || !leaves(walker.from, exit, leave & ~LEAVES, ray);
+            }
+        }
+        if (stretch.first < stretch.steps.count || walker.is_done || walker.strays) break;
+    }
+    return stretch;
 }

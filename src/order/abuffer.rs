@@ -58,10 +58,10 @@ impl Line {
 
 /// The image plane: pixels are square, `pixel` wide at depth 1.
 #[derive(Debug, Clone, Copy)]
-struct Raster {
-    width: usize,
-    height: usize,
-    pixel: f64,
+pub(super) struct Raster {
+    pub width: usize,
+    pub height: usize,
+    pub pixel: f64,
 }
 
 impl Raster {
@@ -273,9 +273,9 @@ pub(super) struct Band {
 }
 
 impl ABuffer {
-    /// `vertices` are in world space, `boundary` is [`Relations::boundary`](super::relations::Relations::boundary) for the eye of
-    /// `view`.
-    pub(super) fn new(vertices: &[DVec3], boundary: &[BoundaryFace], view: &View) -> Self {
+    /// What the eye of `view` sees. `vertices` are in world space, `boundary` is
+    /// [`Relations::boundary`](super::relations::Relations::boundary) for it.
+    pub(super) fn of_view(vertices: &[DVec3], boundary: &[BoundaryFace], view: &View) -> Self {
         let raster = Raster {
             width: view.width as usize,
             height: view.height as usize,
@@ -287,10 +287,15 @@ impl ABuffer {
             DVec3::new(frame.right.dot(offset), -frame.up.dot(offset), frame.forward.dot(offset))
         };
         let vertices: Vec<DVec3> = vertices.par_iter().with_min_len(1024).map(from_eye).collect();
+        Self::new(&vertices, boundary, raster)
+    }
+
+    /// `vertices` are relative to the eye: right, down, into the picture.
+    pub(super) fn new(vertices: &[DVec3], boundary: &[BoundaryFace], raster: Raster) -> Self {
         let footprints: Vec<Footprint> = boundary
             .par_iter()
             .with_min_len(256)
-            .filter_map(|face| Footprint::new(face, &vertices, raster))
+            .filter_map(|face| Footprint::new(face, vertices, raster))
             .collect();
         let bands = footprints_of_bands(&footprints, raster);
         Self { raster, footprints, bands }
@@ -455,7 +460,7 @@ mod tests {
             let (vertices, faces) = faces(&mut random, count);
             // Right, down and into the picture, in place of x, y and z.
             let world: Vec<DVec3> = vertices.iter().map(|&v| v * DVec3::new(1.0, -1.0, -1.0)).collect();
-            let abuffer = ABuffer::new(&world, &faces, &view);
+            let abuffer = ABuffer::of_view(&world, &faces, &view);
             let raster = abuffer.raster;
             let bands = abuffer.map_bands(
                 || (),

@@ -1,9 +1,12 @@
 //! Where the rays of a picture enter the shell and leave it, from the A-buffer: all that a
 //! walk along them (M. Garrity, "Raytracing irregular volume data", 1990) needs to know.
 
-use super::abuffer::{ABuffer, Crossing};
+use glam::DVec3;
+use rayon::prelude::*;
+
+use super::abuffer::{ABuffer, Crossing, Raster};
 use super::relations::FaceTable;
-use crate::scene::View;
+use crate::scene::{LightView, View};
 use crate::shell::Shell;
 
 /// In [`Crossings::places`]: the ray leaves the shell here; else it enters it.
@@ -36,7 +39,31 @@ impl Crossings {
     /// included.
     pub fn new(faces: &FaceTable, shell: &Shell, view: &View) -> Self {
         let boundary = faces.boundary(&shell.determinants, &shell.vertices, view.camera.eye);
-        let abuffer = ABuffer::new(&shell.vertices, &boundary, view);
+        Self::of(&ABuffer::of_view(&shell.vertices, &boundary, view))
+    }
+
+    /// The same of the picture of a light, `side` pixels a side. Parallel rays are those of an eye that a projective map has brought in
+    /// from infinity: it takes planes to planes, and keeps what is in front of what.
+    pub fn of_light(faces: &FaceTable, shell: &Shell, light: &LightView, side: u32) -> Self {
+        let pixel = if light.is_parallel { light.pixel / light.far } else { light.pixel };
+        let from_light = |&vertex: &DVec3| {
+            let offset = (vertex - light.origin) / light.far;
+            let [right, up, depth] =
+                [light.frame.right, light.frame.up, light.frame.forward].map(|axis| axis.dot(offset));
+            if light.is_parallel {
+                // Depths are 0 to 1; twice that is as far as any.
+                DVec3::new(right, -up, 1.0) / (2.0 - depth)
+            } else {
+                DVec3::new(right, -up, depth)
+            }
+        };
+        let vertices: Vec<DVec3> = shell.vertices.par_iter().with_min_len(1024).map(from_light).collect();
+        let boundary = faces.boundary(&shell.determinants, &vertices, DVec3::ZERO);
+        let raster = Raster { width: side as usize, height: side as usize, pixel };
+        Self::of(&ABuffer::new(&vertices, &boundary, raster))
+    }
+
+    fn of(abuffer: &ABuffer) -> Self {
         let bands = abuffer.map_bands(
             || (),
             |(), band| {
@@ -46,7 +73,7 @@ impl Crossings {
             },
         );
         let mut all = Self::default();
-        all.of_pixels.reserve_exact(view.width as usize * view.height as usize);
+        all.of_pixels.reserve_exact(bands.iter().map(|band| band.of_pixels.len()).sum());
         for band in bands {
             let before = all.places.len() as u32;
             all.of_pixels.extend(band.of_pixels.iter().map(|range| range.map(|place| before + place)));

@@ -66,7 +66,7 @@ impl Sorter {
         let relations = elapsed();
 
         let image_pairs = {
-            let abuffer = ABuffer::new(&shell.vertices, &boundary, view);
+            let abuffer = ABuffer::of_view(&shell.vertices, &boundary, view);
             gaps::relate(&abuffer, shell.topology.tetrahedra.len())
         };
         let abuffer = elapsed();

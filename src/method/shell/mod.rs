@@ -11,6 +11,7 @@
 mod canvas;
 mod constants;
 mod left;
+mod lens;
 pub mod lit;
 pub mod outline;
 mod plan;
@@ -228,11 +229,16 @@ impl Method for Shell {
             }
         };
         let keeps_shadows = self.shadows.is_some();
+        let casts_shadows = self.scene.shading.as_ref().is_some_and(|shading| shading.casts_shadows());
+        if walks || (casts_shadows && !keeps_shadows) {
+            ways(&mut self.ways, &self.scene.shell).place(&self.gpu, &self.scene.shell)?;
+        }
         if !keeps_shadows {
             let shadows = Shadows::draw(
                 &self.gpu,
                 &self.scene,
                 &self.volume,
+                self.ways.as_ref(),
                 self.leaps(),
                 &*self.progress,
                 &self.interrupt,
@@ -243,9 +249,6 @@ impl Method for Shell {
             self.shadows = Some(shadows);
         }
         self.progress.stage("uploading the view");
-        if let Sight::Walked(_) = &sight {
-            ways(&mut self.ways, &self.scene.shell).place(&self.gpu, &self.scene.shell)?;
-        }
         let kind = self.kind(&sight, &seen, view);
         let canvas = self.canvas.take();
         let canvas = self.canvas(canvas, kind, &sight, &seen, view, is_uploaded)?;

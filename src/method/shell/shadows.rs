@@ -13,10 +13,12 @@ use glam::{DMat3, DVec2, DVec3};
 use rayon::prelude::*;
 
 use super::constants::{ViewConstants, constants_of_volume};
-use super::seen::{Cell, Tile};
+use super::lens::{LitByLight, NEAR, PictureFrame, in_its_unit};
 use super::volume::DeviceVolume;
+use super::walk::{RayBuffers, Ways};
 use crate::Result;
 use crate::gpu::{Batch, Buffer, Draw, Gpu, Keeps, Pipeline, PipelineInfo, Sampled, Target, draw, shaders};
+use crate::order::Crossings;
 use crate::progress::{Interrupt, Progress};
 use crate::scene::shading::MOST_LIGHTS;
 use crate::scene::{LightView, March, Scene, Skip};
@@ -53,17 +55,6 @@ pub const MOST_PICTURES: usize = 6 * MOST_LIGHTS;
 /// `PARTS` of `glsl/include/curve.glsl`.
 const PARTS: usize = 4;
 
-/// The side of a [`Tile`] in pixels: a power of two. Where many tetrahedra are seen in one, it is smaller.
-const TILE: u32 = 16;
-
-/// Tetrahedra in a tile from which on it is too large, unless it is a pixel already: every pixel of it tries them all, a few times,
-/// and gives up after `MOST_PASSES` of `glsl/include/gather.glsl`.
-const CROWD: usize = 4096;
-
-/// Depth before which a light sees nothing, as a part of the depth of its picture: what it stands in is not drawn by infinite
-/// slopes.
-const NEAR: f32 = 1e-6;
-
 /// Texels a step, at most: coarser ones miss what is a texel thick.
 const COARSEST_STEP: f64 = 0.5;
 
@@ -82,17 +73,15 @@ pub struct Shadows {
     blockers: Option<Target>,
 }
 
-/// How a light's tetrahedra lie in its picture.
-#[derive(Default)]
-struct Drawn {
-    cells: Vec<Cell>,
-    tiles: Vec<Tile>,
-    members: Vec<u32>,
-    minified: bool,
+/// What draws the curves: of rays that walk, and of those that they leave.
+struct CurvePipelines {
+    walk: Pipeline,
+    left: Pipeline,
 }
 
 impl Shadows {
-    /// Draws the pictures of all lights that cast shadows; `None` where there is no such light. Where `leaps`, rays do, over what is empty.
+    /// Draws the pictures of all lights that cast shadows; `None` where there is no such light. `ways` are placed, of the scene's shell;
+    /// where `leaps`, rays do, over what is empty.
     ///
     /// # Errors
     /// [`Error::Device`](crate::Error::Device) where the pictures are too large for the device,
@@ -101,6 +90,7 @@ impl Shadows {
         gpu: &Arc<Gpu>,
         scene: &Scene,
         volume: &DeviceVolume,
+        ways: Option<&Ways>,
         leaps: bool,
         progress: &dyn Progress,
         interrupt: &Interrupt,
@@ -108,6 +98,7 @@ impl Shadows {
         let Some(shading) = scene.shading.as_ref().filter(|shading| shading.casts_shadows()) else {
             return Ok(None);
         };
+        let ways = ways.expect("placed where a light casts shadows");
         let (centre, radius) = scene.bounds();
         let mut views = Vec::new();
         let mut ranges = Vec::new();
@@ -127,7 +118,7 @@ impl Shadows {
             })
         };
         let mut shadows = Self {
-            curves: target(1 + PARTS, false)?,
+            curves: target(1 + PARTS, true)?,
             blockers: if scene.solids.is_empty() { None } else { Some(target(1, true)?) },
             views,
             ranges,
@@ -135,7 +126,7 @@ impl Shadows {
             columns,
             opacity_distance: scene.medium.opacity_distance,
         };
-        shadows.draw_curves(gpu, scene, volume, leaps, &|done| {
+        shadows.draw_curves(gpu, scene, volume, ways, leaps, &|done| {
             progress.fraction(done);
             interrupt.check()
         })?;
@@ -199,10 +190,9 @@ impl Shadows {
     /// Of no eye.
     fn picture(&self, index: usize) -> LightPicture {
         let view = &self.views[index];
-        let place = [index as u32 % self.columns, index as u32 / self.columns];
         let half_side = 0.5 * self.side as f32;
         LightPicture {
-            middle: place.map(|place| (place * self.side) as f32 + half_side),
+            middle: self.corner(index).map(|pixel| pixel as f32 + half_side),
             half_side,
             pixel: in_its_unit(view) as f32,
             is_parallel: view.is_parallel.into(),
@@ -220,114 +210,91 @@ impl Shadows {
         gpu: &Arc<Gpu>,
         scene: &Scene,
         volume: &DeviceVolume,
+        ways: &Ways,
         leaps: bool,
         between: &dyn Fn(f64) -> Result<()>,
     ) -> Result<()> {
-        let mut drawn = Drawn::default();
-        for index in 0..self.views.len() {
-            self.add_picture(&mut drawn, scene, index);
-        }
         let step = match scene.march {
             March::Default { step } => step.min(COARSEST_STEP),
             March::Paper { .. } | March::Exact => COARSEST_STEP,
         };
         let constants = ViewConstants {
+            centre: [0.5 * self.side as f32; 2],
             near: NEAR,
             lod_scale: scene.medium.lod_footprint as f32,
             step: step as f32,
             samples: 1,
             ..ViewConstants::of_volume(&scene.volume)
         };
-        let minified = drawn.minified || !scene.skips.allow(Skip::Levels);
-        let info = PipelineInfo {
-            vertex: shaders::TILE_VERT.with(&["LIGHT"]),
-            fragment: shaders::SHADOW_FRAG.with(if leaps { &["SPARSE"] } else { &[] }),
-            constants: &constants_of_volume(March::default(), minified, &scene.volume),
-            storage_buffers: &[0, 1, 2, 6],
-            uniform_buffers: &[],
-            texel_buffers: &[],
-            textures: if leaps { &[8, 22] } else { &[8] },
-            push_constant_bytes: size_of::<ViewConstants>() as u32,
-            keeps: Keeps::Last,
-        };
-        let pipeline = Pipeline::new(gpu, &self.curves, &info)?;
-        let tiles = drawn.tiles.len() as u32;
-        let cells = Buffer::storage(gpu, "the lights' tetrahedra", &drawn.cells)?;
-        let tiles_buffer = Buffer::storage(gpu, "the lights' tiles", &drawn.tiles)?;
-        let members = Buffer::storage(gpu, "the members of the lights' tiles", &drawn.members)?;
         let pictures = Buffer::storage(gpu, "the lights' pictures", &self.pictures_of_no_eye())?;
-        draw(&Draw {
-            target: &self.curves,
-            clears: true,
-            buffers: &[(0, &cells), (1, &tiles_buffer), (2, &members), (6, &pictures)],
-            textures: &volume.textures(),
-            push_constants: bytemuck::bytes_of(&constants),
-            batches: &[Batch { pipeline: &pipeline, vertices: 0..6 * tiles }],
-            between,
-        })?;
+        // By whether levels of detail but 0 are needed.
+        let mut pipelines: [Option<CurvePipelines>; 2] = [None, None];
+        for (index, view) in self.views.iter().enumerate() {
+            let frame = PictureFrame { index, corner: self.corner(index), image: self.curves.size(), side: self.side };
+            let lit = LitByLight::new(scene, view, &frame);
+            let crossings = Crossings::of_light(ways.faces(), &scene.shell, view, self.side);
+            let minified = lit.minified || !scene.skips.allow(Skip::Levels);
+            let pipelines = &mut pipelines[usize::from(minified)];
+            if pipelines.is_none() {
+                *pipelines = Some(self.curve_pipelines(gpu, scene, leaps, minified)?);
+            }
+            let CurvePipelines { walk, left } = pipelines.as_ref().expect("made just now");
+            let cells = Buffer::floats(gpu, "a light's tetrahedra", &lit.cells)?;
+            let cells_of_left = Buffer::storage(gpu, "a light's tetrahedra", &lit.cells)?;
+            let tiles = Buffer::storage(gpu, "a light's tiles", &lit.tiles)?;
+            let members = Buffer::storage(gpu, "the members of a light's tiles", &lit.members)?;
+            let rays = RayBuffers::new(gpu, &crossings)?;
+            let mut buffers = vec![(0, &cells_of_left), (1, &tiles), (2, &members), (6, &pictures), (18, &cells)];
+            buffers.push((19, ways.beyond()));
+            buffers.extend(rays.buffers());
+            let vertices = 0..6 * lit.tiles.len() as u32;
+            draw(&Draw {
+                target: &self.curves,
+                clears: index == 0,
+                buffers: &buffers,
+                textures: &volume.textures(),
+                push_constants: bytemuck::bytes_of(&constants),
+                batches: &[
+                    Batch { pipeline: walk, vertices: vertices.clone() },
+                    Batch { pipeline: left, vertices },
+                ],
+                between: &|done| between((index as f64 + done) / self.views.len() as f64),
+            })?;
+        }
         Ok(())
     }
 
-    /// Adds what one light sees of the shell.
-    fn add_picture(&self, drawn: &mut Drawn, scene: &Scene, index: usize) {
-        let view = &self.views[index];
-        let lens = Lens::new(view, self.side);
-        let found = (0..scene.shell.topology.tetrahedra.len()).into_par_iter();
-        let mut found: Vec<(Cell, Bounds, bool)> = found.filter_map(|t| lens.cell(scene, t)).collect();
-        // Members that come about nearest first are sorted quickly in every pixel.
-        found.par_sort_by(|a, b| a.1.nearest.total_cmp(&b.1.nearest));
-        let first_cell = drawn.cells.len() as u32;
-        let (tile_side, inside) = self.tiled(first_cell, &found);
-        let across = self.side.div_ceil(tile_side);
-        for (cell, _, minified) in found {
-            drawn.cells.push(cell);
-            drawn.minified |= minified;
-        }
-        let [width, height] = self.curves.size().map(f64::from);
-        let corner =
-            [index as u32 % self.columns, index as u32 / self.columns].map(|place| place * self.side);
-        for tile in inside.chunk_by(|a, b| a.0 == b.0) {
-            let first = drawn.members.len() as u32;
-            drawn.members.extend(tile.iter().map(|(_, cell)| cell));
-            let [x, y] = [tile[0].0 % across * tile_side, tile[0].0 / across * tile_side];
-            let clip = |axis: usize, pixel: u32, size: f64| {
-                (2.0 * f64::from(corner[axis] + pixel.min(self.side)) / size - 1.0) as f32
-            };
-            drawn.tiles.push(Tile {
-                bounds: [
-                    clip(0, x, width),
-                    clip(1, y, height),
-                    clip(0, x + tile_side, width),
-                    clip(1, y + tile_side, height),
-                ],
-                members: [first, drawn.members.len() as u32],
-                picture: index as u32,
-                padding: 0,
-            });
-        }
+    fn curve_pipelines(&self, gpu: &Arc<Gpu>, scene: &Scene, leaps: bool, minified: bool) -> Result<CurvePipelines> {
+        let switches: &[&str] = if leaps { &["SPARSE"] } else { &[] };
+        let mut constants = constants_of_volume(March::default(), minified, &scene.volume).to_vec();
+        // Of these the last is used: whether rays begin in the shell.
+        let is_any_inside = self.views.iter().any(|view| !view.is_parallel);
+        constants.extend([0, 0, u32::from(is_any_inside)]);
+        let info = PipelineInfo {
+            vertex: shaders::TILE_VERT.with(&["LIGHT", "WALKED"]),
+            fragment: shaders::SHADOW_FRAG.with(switches),
+            constants: &constants,
+            storage_buffers: &[1, 6],
+            uniform_buffers: &[],
+            texel_buffers: &[18, 19, 20, 21],
+            textures: if leaps { &[8, 22] } else { &[8] },
+            push_constant_bytes: size_of::<ViewConstants>() as u32,
+            keeps: Keeps::Nearest,
+        };
+        let walk = Pipeline::new(gpu, &self.curves, &info)?;
+        let info = PipelineInfo {
+            vertex: shaders::TILE_VERT.with(&["LIGHT"]),
+            fragment: shaders::SHADOW_LEFT_FRAG.with(switches),
+            storage_buffers: &[0, 1, 2, 6],
+            texel_buffers: &[],
+            ..info
+        };
+        Ok(CurvePipelines { walk, left: Pipeline::new(gpu, &self.curves, &info)? })
     }
 
-    /// The tiles of a picture, and the cells that are seen in each, as sorted pairs of tile and cell; and the side of a tile.
-    fn tiled(&self, first_cell: u32, found: &[(Cell, Bounds, bool)]) -> (u32, Vec<(u32, u32)>) {
-        let mut tile_side = TILE;
-        loop {
-            let across = self.side.div_ceil(tile_side);
-            let mut inside: Vec<(u32, u32)> = Vec::new(); // tile, cell
-            for (cell, (_, bounds, _)) in (first_cell..).zip(found) {
-                let tiles = |axis: usize| {
-                    // A pixel more on either side than rounding can be off.
-                    let tile = |pixel: f64| pixel.clamp(0.0, f64::from(self.side) - 1.0) as u32 / tile_side;
-                    tile(bounds.low[axis] - 1.0)..=tile(bounds.high[axis] + 1.0)
-                };
-                inside.extend(tiles(1).flat_map(|y| tiles(0).map(move |x| (y * across + x, cell))));
-            }
-            inside.par_sort_unstable();
-            let largest = inside.chunk_by(|a, b| a.0 == b.0).map(<[_]>::len).max().unwrap_or(0);
-            if largest <= CROWD || tile_side == 1 {
-                return (tile_side, inside);
-            }
-            tile_side /= 2;
-        }
+    /// Where a picture lies in the image: its upper left corner, in pixels.
+    fn corner(&self, index: usize) -> [u32; 2] {
+        [index as u32 % self.columns, index as u32 / self.columns].map(|place| place * self.side)
     }
 
     fn draw_blockers(&mut self, gpu: &Arc<Gpu>, scene: &Scene, interrupt: &Interrupt) -> Result<()> {
@@ -372,11 +339,6 @@ impl Shadows {
     }
 }
 
-/// Distance of pixel centres, at depth 1 or of parallel rays, in parts of the picture's depth.
-fn in_its_unit(view: &LightView) -> f64 {
-    if view.is_parallel { view.pixel / view.far } else { view.pixel }
-}
-
 /// `None` where the light sees the triangle edge-on.
 fn blocker(view: &LightView, corners: [DVec3; 3], picture: u32) -> Option<Blocker> {
     let [a, b, c] = corners.map(|corner| view.frame.view_from_world() * (corner - view.origin) / view.far);
@@ -395,94 +357,6 @@ fn blocker(view: &LightView, corners: [DVec3; 3], picture: u32) -> Option<Blocke
         picture,
         padding: [0; 3],
     })
-}
-
-/// Where a tetrahedron is in a light's picture.
-struct Bounds {
-    /// In pixels from the upper left corner.
-    low: DVec2,
-    high: DVec2,
-    /// The least depth of a vertex.
-    nearest: f64,
-}
-
-/// A light's picture, ready to place tetrahedra in.
-struct Lens<'a> {
-    view: &'a LightView,
-    light_from_world: DMat3,
-    side: f64,
-}
-
-impl<'a> Lens<'a> {
-    fn new(view: &'a LightView, side: u32) -> Self {
-        Self { view, light_from_world: view.frame.view_from_world(), side: f64::from(side) }
-    }
-
-    /// A tetrahedron, where it is, and whether more than level 0 can be needed in it; `None` where none of it is seen.
-    fn cell(&self, scene: &Scene, t: usize) -> Option<(Cell, Bounds, bool)> {
-        let Shell { vertices, texture, .. } = &*scene.shell;
-        if !scene.shell.has_maps(t) {
-            return None;
-        }
-        let unit = self.view.far;
-        let corners = scene.shell.vertices_of(t);
-        let corners = corners.map(|corner| self.light_from_world * (corner - self.view.origin) / unit);
-        let bounds = self.bounds(&corners)?;
-        let planes = scene.shell.planes(t);
-        let planes = std::array::from_fn(|k| {
-            // From a vertex of the face that both its cells choose, as for the eye.
-            let on_face = vertices[scene.shell.face(t, k)[0] as usize] - self.view.origin;
-            let normal = planes[k].truncate();
-            (self.light_from_world * normal).as_vec3().extend((normal.dot(on_face) / unit) as f32).into()
-        });
-        let texture_from_light =
-            scene.shell.cells()[t].texture_from_world * self.light_from_world.transpose() * unit;
-        let at_origin = texture[t][0] - texture_from_light * corners[0];
-        let rows =
-            std::array::from_fn(|i| texture_from_light.row(i).as_vec3().extend(at_origin[i] as f32).into());
-        let size = scene.volume.levels[0].size;
-        let densest =
-            (0..3).map(|i| f64::from(size[i]) * texture_from_light.row(i).length()).fold(0.0, f64::max);
-        let farthest = if self.view.is_parallel {
-            1.0
-        } else {
-            corners.iter().map(|corner| corner.length()).fold(0.0, f64::max)
-        };
-        let footprint = scene.medium.lod_footprint * in_its_unit(self.view) * farthest;
-        let cell = Cell { outline: [[0.0; 4]; 2], planes, texture: rows };
-        Some((cell, bounds, footprint * densest > 1.0))
-    }
-
-    fn bounds(&self, corners: &[DVec3; 4]) -> Option<Bounds> {
-        let nearest = corners.iter().map(|corner| corner.z).fold(f64::INFINITY, f64::min);
-        let farthest = corners.iter().map(|corner| corner.z).fold(f64::NEG_INFINITY, f64::max);
-        let near = f64::from(NEAR);
-        if farthest <= near {
-            return None;
-        }
-        let (mut low, mut high) = (DVec2::splat(f64::INFINITY), DVec2::splat(f64::NEG_INFINITY));
-        let mut include = |point: DVec3| {
-            let scale = in_its_unit(self.view) * if self.view.is_parallel { 1.0 } else { point.z };
-            let place = DVec2::new(point.x, -point.y) / scale + 0.5 * self.side;
-            (low, high) = (low.min(place), high.max(place));
-        };
-        let is_cut = !self.view.is_parallel && nearest < near;
-        for (i, &corner) in corners.iter().enumerate() {
-            if !is_cut || corner.z >= near {
-                include(corner);
-            }
-            if is_cut {
-                for &other in &corners[..i] {
-                    if (corner.z < near) != (other.z < near) {
-                        let part = (near - corner.z) / (other.z - corner.z);
-                        include(corner.lerp(other, part).with_z(near));
-                    }
-                }
-            }
-        }
-        let is_beside = high.min_element() < -1.0 || low.max_element() > self.side + 1.0;
-        (!is_beside).then_some(Bounds { low, high, nearest })
-    }
 }
 
 #[cfg(test)]

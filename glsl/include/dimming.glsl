@@ -1,0 +1,81 @@
+// How the medium dims a light's ray, as the curve of curve.glsl, made front to back. Knots are placed as the opacity grows; once there are
+// too many, every other one is left out.
+
+#include "curve.glsl"
+
+layout(location = 0) out vec4 out_curve[CURVE_LAYERS];
+
+// Optical depth after which what is left of the light does not count: a thousandth.
+const float DARK = 7.0;
+// An exponential has no end: from the last knot that an opaque ray has, 1 - 1 / GROWTHS, the line goes to where this part of the
+// rest is left.
+const float LEFT = 0.125;
+// Shorter steps than any; keeps an infinite extinction times nothing from being no number.
+const float LEAST = 1e-30;
+
+float knots[KNOTS];
+uint placed = 0;
+float growth = LEAST_GROWTH;
+float doublings = 0.0; // of the growth
+float all_but_dark = 3.0e38; // the depth at which LEFT is left
+
+// Where in a step of an optical depth, after another one, that one is reached.
+float reach(float wanted, float before, float optical, float from, float step) {
+    return from + step * clamp((wanted - before) / optical, 0.0, 1.0);
+}
+
+// Leaves out every other knot.
+void thin_out() {
+    for (uint i = 0; i < KNOTS / 2; i++) knots[i] = knots[2 * i];
+    placed = (placed + 1) / 2;
+    growth *= 2.0;
+    doublings += 1.0;
+}
+
+float optical_so_far = 0.0;
+float dimmed_until = 0.0; // the depth after which nothing was
+
+// Places the knots that are reached in a step at depth `from`, before which the optical depth is `before`.
+void place(float from, float step, float before, float optical) {
+    float now = before + optical;
+    float grown = min(opacity(now), 1.0);
+    while (grown >= growth * float(KNOTS)) thin_out();
+    for (; float(placed) * growth <= grown && placed < KNOTS; placed++) {
+        knots[placed] = reach(optical_depth(float(placed) * growth), before, optical, from, step);
+    }
+    float nearly = optical_depth(1.0 - LEFT / float(GROWTHS));
+    if (now >= nearly && all_but_dark >= 3.0e38) all_but_dark = reach(nearly, before, optical, from, step);
+}
+
+// Goes through a step at depth `from` that has this optical depth.
+void dim(float from, float step, float optical) {
+    if (!(optical > 0.0)) return;
+    place(from, step, optical_so_far, optical);
+    optical_so_far += optical;
+    dimmed_until = from + step;
+}
+
+bool is_dark() {
+    return optical_so_far >= DARK;
+}
+
+void leave_unresolved() {
+    for (uint i = 0; i < CURVE_LAYERS; i++) out_curve[i] = vec4(UNRESOLVED);
+}
+
+void write_curve() {
+    if (optical_so_far == 0.0) {
+        for (uint i = 0; i < CURVE_LAYERS; i++) out_curve[i] = vec4(0.0);
+        return;
+    }
+    float whole = min(opacity(optical_so_far), 1.0);
+    float end = min(dimmed_until, all_but_dark);
+    // A line through the last knot that reaches the opacity of all at the end; beyond, there are none.
+    if (placed == KNOTS) thin_out();
+    float last = knots[placed - 1];
+    float rest = whole - float(placed - 1) * growth;
+    knots[placed] = rest > 0.0 ? last + (end - last) * growth / rest : last;
+    for (uint i = placed + 1; i < KNOTS; i++) knots[i] = 3.0e38;
+    out_curve[0] = vec4(2.0 * doublings + whole, knots[4], knots[8], knots[12]);
+    for (uint i = 0; i < PARTS; i++) out_curve[1 + i] = vec4(knots[4 * i], knots[4 * i + 1], knots[4 * i + 2], knots[4 * i + 3]);
+}

@@ -1,0 +1,87 @@
+#version 450
+#extension GL_ARB_shading_language_include : require
+// switches: SPARSE
+// A pixel of a light's picture that shadow.frag.glsl has left: of a ray that is in several parts of the shell at once, whose media add,
+// or that strays. By the same means as cycle.frag.glsl.
+
+#define LIGHT
+#include "shell.glsl"
+#include "medium.glsl"
+#include "ray.glsl"
+#include "sample.glsl"
+#include "gather.glsl"
+#include "picture.glsl"
+#include "dimming.glsl"
+
+layout(early_fragment_tests) in; // by depth: else all pixels would be gone through
+
+layout(location = 1) flat in uint picture;
+
+// Follows the ray to its end; false where that is more than can be resolved.
+bool follow(vec3 origin, vec3 ray) {
+    LightPicture light = light_pictures[picture];
+    bool is_parallel = light.is_parallel != 0;
+    float per_depth = length(ray) * light.opacity_distances;
+    float z = 0.0;
+    float horizon;
+    bool done = false;
+    do {
+        uint count = gather(origin, ray, z, horizon);
+        done = count == 0;
+        if (done) break;
+        z = max(z, spans[0].x);
+        if (z >= horizon) break; // more overlap here than are kept
+        uint first = 0;
+        while (z < horizon && !is_dark()) {
+            while (first < count && spans[first].y <= z) first++;
+            if (first == count) break;
+            float next = horizon;
+            uint end = first;
+            for (; end < count && spans[end].x <= z; end++) {
+                if (spans[end].y > z) next = min(next, spans[end].y);
+            }
+            if (end < count) next = min(next, spans[end].x);
+            Steps steps = no_steps();
+            uint present = 0;
+            Path path; // of the last one, which mostly is the only one: it need not be read again for every sample
+            for (uint hit = first; hit < end; hit++) {
+                if (spans[hit].y <= z) continue;
+                path = path_from(cells[hits[hit]].texture, origin, ray, light.pixel, is_parallel);
+                Steps alone = steps_of(path, vec2(z, next));
+                if (alone.count > steps.count) steps = alone;
+                present++;
+            }
+            passes += AT_ONCE * (end - first + 2) * (steps.count + 3);
+            if (passes > MOST_PASSES) break;
+            // In a gap there are no steps. Looks are fewer than the passes that were counted for the steps.
+            bool is_alone = present == 1;
+            uint looks = 0;
+            for (uint i = is_alone ? seek(path, steps, 0, looks) : 0; i < steps.count;) {
+                float at = middle(steps, i);
+                float of_step = 0.0;
+                if (is_alone) {
+                    of_step = extinction(fetch(path, at));
+                } else {
+                    for (uint hit = first; hit < end; hit++) {
+                        if (spans[hit].y <= z) continue;
+                        of_step += extinction(fetch(path_from(cells[hits[hit]].texture, origin, ray, light.pixel, is_parallel), at));
+                    }
+                }
+                dim(z + float(i) * steps.size, steps.size, of_step * max(steps.size * per_depth, LEAST));
+                i = is_alone ? seek(path, steps, i + 1, looks) : i + 1;
+            }
+            z = next;
+        }
+        done = horizon >= 3.0e38 || is_dark();
+    } while (!done && passes <= MOST_PASSES);
+    return done && passes <= MOST_PASSES;
+}
+
+void main() {
+    LightPicture light = light_pictures[picture];
+    vec2 place = (gl_FragCoord.xy - light.middle) * vec2(light.pixel, -light.pixel);
+    vec3 origin = light.is_parallel != 0 ? vec3(place, 0.0) : vec3(0.0);
+    vec3 ray = light.is_parallel != 0 ? vec3(0.0, 0.0, 1.0) : vec3(place, 1.0);
+    if (follow(origin, ray)) write_curve();
+    else leave_unresolved();
+}
