@@ -139,7 +139,9 @@ fn nothing_is_compiled_in_that_a_scene_does_not_need() {
     let of_solids: &[&str] = &["solid_depth", "solid_depths"];
     let of_depth: &[&str] = &["out_depth"];
     let of_leaps: &[&str] = &["proximity"];
-    for family in [&shaders::SHELL_FRAG, &shaders::WALK_FRAG, &shaders::SHADOW_FRAG] {
+    let families =
+        [&shaders::SHELL_FRAG, &shaders::WALK_FRAG, &shaders::SHADOW_FRAG, &shaders::SHADOW_LEFT_FRAG];
+    for family in families {
         let (without, with) = (words(family.with(&[])), words(family.with(&["SPARSE"])));
         assert!(of_leaps.iter().all(|name| !without.contains(name) && with.contains(name)));
     }
@@ -158,6 +160,8 @@ fn nothing_is_compiled_in_that_a_scene_does_not_need() {
     assert_eq!(shell(&[]), [8]);
     assert_eq!(shell(&["SPARSE"]), [8, 22]);
     assert_eq!(bindings(shaders::WALK_FRAG.with(&[])), [8, 18, 19, 20, 21]);
+    assert_eq!(bindings(shaders::SHADOW_FRAG.with(&[])), [6, 8, 18, 19, 20, 21]);
+    assert_eq!(bindings(shaders::SHADOW_LEFT_FRAG.with(&[])), [0, 2, 6, 8]);
     assert_eq!(shell(&["SOLIDS"]), [8, 15]);
     assert_eq!(shell(&["LIT"]), [3, 5, 8, 9]);
     assert_eq!(shell(&["LIT", "SHADOWS"]), [3, 5, 6, 8, 9, 10]);
@@ -175,6 +179,7 @@ fn shell_structs_agree() {
     // The shell's vertex shader reads no constants, but the fragment shaders do.
     let others = [
         shaders::SHADOW_FRAG.with(&[]),
+        shaders::SHADOW_LEFT_FRAG.with(&[]),
         shaders::SOLID_FRAG.with(&[]),
         shaders::SOLID_VERT.with(&[]),
         shaders::SURFACE_FRAG.with(&[]),
@@ -190,12 +195,12 @@ fn shell_structs_agree() {
         shaders::SHELL_VERT.with(&["LIT"]),
         shaders::CYCLE_FRAG.with(&[]),
         shaders::CYCLE_FRAG.with(&["LIT"]),
-        shaders::SHADOW_FRAG.with(&[]),
+        shaders::SHADOW_LEFT_FRAG.with(&[]),
     ];
     for shader in others {
         assert_eq!(layout(shader, "Cell"), (members.clone(), stride));
     }
-    for on in [&[][..], &["LIGHT"]] {
+    for on in [&[][..], &["LIGHT"], &["LIGHT", "WALKED"]] {
         let (members, stride) = layout(shaders::TILE_VERT.with(on), "Tile");
         assert_eq!(members, host!(Tile: bounds, members, picture));
         assert_eq!(stride, Some(size_of::<Tile>() as u32));
@@ -215,7 +220,8 @@ fn structs_of_solids_and_shadows_agree() {
     assert_eq!(members, host!(Blocker: corners, depth_function, picture));
     assert_eq!(stride, Some(size_of::<Blocker>() as u32));
     let others =
-        [shaders::SHADOW_FRAG, shaders::BLOCKER_VERT, shaders::BLOCKER_FRAG].map(|family| family.with(&[]));
+        [shaders::SHADOW_FRAG, shaders::SHADOW_LEFT_FRAG, shaders::BLOCKER_VERT, shaders::BLOCKER_FRAG]
+            .map(|family| family.with(&[]));
     for shader in shadowed().into_iter().chain(others) {
         let (members, stride) = layout(shader, "LightPicture");
         let expected =

@@ -30,6 +30,18 @@ impl DeviceImage {
         view_type: vk::ImageViewType,
         aspect: vk::ImageAspectFlags,
     ) -> Result<Self> {
+        Self::mapped(gpu, name, info, view_type, aspect, vk::ComponentMapping::default())
+    }
+
+    /// The same, whose texels are seen with other channels.
+    pub(super) fn mapped(
+        gpu: &Arc<Gpu>,
+        name: &str,
+        info: &vk::ImageCreateInfo<'_>,
+        view_type: vk::ImageViewType,
+        aspect: vk::ImageAspectFlags,
+        channels: vk::ComponentMapping,
+    ) -> Result<Self> {
         // SAFETY: the caller checked sides against the limits, and the format against its features.
         let raw = unsafe { gpu.raw.create_image(info, None) }
             .map_err(|error| vulkan_error(&format!("creating the image of {name}"), error))?;
@@ -57,6 +69,7 @@ impl DeviceImage {
             .image(raw)
             .view_type(view_type)
             .format(info.format)
+            .components(channels)
             .subresource_range(vk::ImageSubresourceRange { aspect_mask: aspect, ..whole() });
         let view = |info: &vk::ImageViewCreateInfo<'_>| {
             // SAFETY: each view covers the image that was just made, or a layer that it has.

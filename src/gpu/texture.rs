@@ -37,6 +37,11 @@ const SAMPLING: Use = (
     vk::PipelineStageFlags::FRAGMENT_SHADER,
 );
 
+/// What a device can do with textures that it filters.
+const FILTERED: vk::FormatFeatureFlags = vk::FormatFeatureFlags::from_raw(
+    vk::FormatFeatureFlags::SAMPLED_IMAGE_FILTER_LINEAR.as_raw() | vk::FormatFeatureFlags::TRANSFER_DST.as_raw(),
+);
+
 /// A mip level: its size, and its texels as `T`, u fastest.
 type Level<'a, T> = ([u32; 3], &'a [T]);
 
@@ -80,24 +85,47 @@ impl Texture3d {
         assert_is_pyramid(&levels);
         Self::check_sides(gpu, name, levels[0].0)?;
         // Vulkan has every device sample this format.
-        Self::upload_levels(gpu, name, vk::Format::R8_UNORM, vk::Filter::NEAREST, &levels, |texels| {
-            Cow::Borrowed(texels)
+        let format = (vk::Format::R8_UNORM, vk::ComponentMapping::default());
+        Self::upload_levels(gpu, name, format, vk::Filter::NEAREST, &levels, |texels| Cow::Borrowed(texels))
+    }
+
+    /// Uploads the fourth channel of all levels, which is all that shaders see of the texels then: a quarter of the memory. `None`
+    /// where the device does not filter such textures.
+    ///
+    /// # Errors
+    /// As [`Texture3d::upload`].
+    ///
+    /// # Panics
+    /// As [`Texture3d::upload`].
+    pub fn upload_alpha(gpu: &Arc<Gpu>, name: &'static str, pyramid: &Pyramid) -> Result<Option<Self>> {
+        let format = vk::Format::R32_SFLOAT;
+        if !gpu.supports(format, FILTERED) {
+            return Ok(None);
+        }
+        let levels: Vec<Level<'_, _>> =
+            pyramid.levels.iter().map(|level| (level.size, level.texels.as_slice())).collect();
+        assert_is_pyramid(&levels);
+        Self::check_sides(gpu, name, levels[0].0)?;
+        let zero = vk::ComponentSwizzle::ZERO;
+        let channels = vk::ComponentMapping { r: zero, g: zero, b: zero, a: vk::ComponentSwizzle::R };
+        Self::upload_levels(gpu, name, (format, channels), vk::Filter::LINEAR, &levels, |texels| {
+            Cow::Owned(texels.iter().flat_map(|texel| texel[3].to_ne_bytes()).collect())
         })
+        .map(Some)
     }
 
     fn upload_colours(gpu: &Arc<Gpu>, name: &'static str, levels: &[Level<'_, [f32; 4]>]) -> Result<Self> {
         assert_is_pyramid(levels);
         let count = u32::try_from(levels.len()).expect("at most 32 levels");
         let (format, _) = Self::check(gpu, name, levels[0].0, count)?;
-        Self::upload_levels(gpu, name, format.raw(), vk::Filter::LINEAR, levels, |texels| {
-            format.encode(texels)
-        })
+        let raw = (format.raw(), vk::ComponentMapping::default());
+        Self::upload_levels(gpu, name, raw, vk::Filter::LINEAR, levels, |texels| format.encode(texels))
     }
 
     fn upload_levels<T>(
         gpu: &Arc<Gpu>,
         name: &'static str,
-        format: vk::Format,
+        (format, channels): (vk::Format, vk::ComponentMapping),
         filter: vk::Filter,
         pyramid: &[Level<'_, T>],
         encode: impl for<'a> Fn(&'a [T]) -> Cow<'a, [u8]>,
@@ -117,7 +145,7 @@ impl Texture3d {
             .tiling(vk::ImageTiling::OPTIMAL)
             .usage(vk::ImageUsageFlags::SAMPLED | vk::ImageUsageFlags::TRANSFER_DST);
         let colour = vk::ImageAspectFlags::COLOR;
-        let image = DeviceImage::new(gpu, name, &info, vk::ImageViewType::TYPE_3D, colour)?;
+        let image = DeviceImage::mapped(gpu, name, &info, vk::ImageViewType::TYPE_3D, colour, channels)?;
 
         let mut regions = Vec::new();
         let mut offset = 0;
@@ -178,9 +206,7 @@ impl Texture3d {
     /// Whether the device can hold a pyramid above `size` texels: in which format, and of how many bytes.
     pub(super) fn check(gpu: &Gpu, name: &str, size: [u32; 3], levels: u32) -> Result<(Rgba, u64)> {
         Self::check_sides(gpu, name, size)?;
-        let features =
-            vk::FormatFeatureFlags::SAMPLED_IMAGE_FILTER_LINEAR | vk::FormatFeatureFlags::TRANSFER_DST;
-        let format = Rgba::best(gpu, features).ok_or_else(|| Error::Device {
+        let format = Rgba::best(gpu, FILTERED).ok_or_else(|| Error::Device {
             message: format!("{} filters no floating-point 3D texture", gpu.info().name),
             help: None,
         })?;

@@ -49,7 +49,7 @@ use rayon::prelude::*;
 use crate::Result;
 use crate::frame::{Frame, Image, Report, Stopwatch};
 use crate::progress::{Interrupt, Progress};
-use crate::scene::{Scene, Shading, View};
+use crate::scene::{Scene, View};
 
 use crossing::{Crossing, Crossings};
 use hierarchy::Path;
@@ -71,7 +71,7 @@ pub const SHADOW_TOLERANCE: f64 = 1e-5;
 
 /// The largest absolute error with which a scene's picture is computed where nothing else is asked for.
 pub fn tolerance(scene: &Scene) -> f64 {
-    if scene.shading.as_ref().is_some_and(Shading::casts_shadows) { SHADOW_TOLERANCE } else { TOLERANCE }
+    if scene.casts_shadows() { SHADOW_TOLERANCE } else { TOLERANCE }
 }
 
 /// What one ray sees.

@@ -186,6 +186,11 @@ pub fn texel_edges(shell: &Shell, size: [u32; 3]) -> [f64; 3] {
 }
 
 impl Scene {
+    /// Whether a light casts shadows.
+    pub fn casts_shadows(&self) -> bool {
+        self.shading.as_ref().is_some_and(Shading::casts_shadows)
+    }
+
     /// Whether `other` has the same picture because nothing in it is another. Of large parts that are not shared it is not known.
     pub fn shows_the_same(&self, other: &Self) -> bool {
         Arc::ptr_eq(&self.shell, &other.shell)

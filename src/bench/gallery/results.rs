@@ -8,7 +8,7 @@ use super::about::About;
 use crate::bench::Environment;
 use crate::frame::Report;
 use crate::metric::Metrics;
-use crate::scene::{Scene, Shading};
+use crate::scene::Scene;
 
 /// Of [`Results::schema`].
 pub const SCHEMA: u32 = 1;
@@ -165,7 +165,7 @@ impl Verdict {
 
 /// The largest RMSE at which a scene passes.
 pub(super) fn bound(scene: &Scene) -> f64 {
-    if scene.shading.as_ref().is_some_and(Shading::casts_shadows) { BOUND_WITH_SHADOWS } else { BOUND }
+    if scene.casts_shadows() { BOUND_WITH_SHADOWS } else { BOUND }
 }
 
 fn name(scene: &Path) -> String {

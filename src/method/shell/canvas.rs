@@ -153,7 +153,7 @@ impl Shell {
     /// In a lit scene.
     fn lit_sight<'a>(&'a self, seen: &'a Seen, view: &'a View) -> Option<LitSight<'a>> {
         let shading = self.scene.shading.as_ref()?;
-        Some(LitSight { shading, shadows: self.shadows(), shell: &self.scene.shell, seen, view })
+        Some(LitSight { shading, shadows: self.shadows.as_ref(), shell: &self.scene.shell, seen, view })
     }
 
     pub(super) fn kind(&self, sight: &Sight, seen: &Seen, view: &View) -> CanvasKind {
@@ -162,7 +162,7 @@ impl Shell {
             ("SOLIDS", self.solids.is_some()),
             ("SPARSE", self.leaps()),
             ("LIT", self.lit.is_some()),
-            ("SHADOWS", self.shadows().is_some()),
+            ("SHADOWS", self.shadows.as_ref().is_some()),
         ];
         let skips = self.scene.skips;
         let minified = seen.minified || !skips.allow(Skip::Levels);
@@ -174,7 +174,7 @@ impl Shell {
         constants.extend([fibre, glow, inside].map(u32::from));
         constants.push(if skips.allow(Skip::Saturation) { walk::SATURATED.to_bits() } else { 0 });
         let lights = self.scene.shading.iter().flat_map(|shading| &shading.lights);
-        constants.extend(lit::constants(lights, self.shadows()));
+        constants.extend(lit::constants(lights, self.shadows.as_ref()));
         CanvasKind {
             width: view.width,
             height: view.height,

@@ -7,7 +7,7 @@ use super::seen::Seen;
 use crate::Result;
 use crate::progress::{Interrupt, Progress};
 use crate::reference::Reference;
-use crate::scene::{Scene, Shading, View};
+use crate::scene::{Scene, View};
 
 /// Largest absolute error: that of f32 sums on the device.
 const TOLERANCE: f64 = 1e-6;
@@ -41,8 +41,7 @@ pub fn fill(
         return Ok(0);
     }
     progress.stage("integrating what the device left");
-    let casts_shadows = scene.shading.as_ref().is_some_and(Shading::casts_shadows);
-    let tolerance = if casts_shadows { TOLERANCE_IN_SHADOWS } else { TOLERANCE };
+    let tolerance = if scene.casts_shadows() { TOLERANCE_IN_SHADOWS } else { TOLERANCE };
     let reference = Reference::new(scene, view).with_tolerance(tolerance);
     let sample = |&pixel: &usize| {
         interrupt.check()?;

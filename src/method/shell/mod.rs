@@ -58,8 +58,8 @@ struct Shell {
     volume: DeviceVolume,
     /// In a lit scene.
     lit: Option<Lit>,
-    /// Once they were needed, and if a light casts any.
-    shadows: Option<Option<Shadows>>,
+    /// Once they were needed.
+    shadows: Option<Shadows>,
     /// Where there are any.
     solids: Option<Solids>,
     /// The most that a ray passes in one tetrahedron.
@@ -119,7 +119,7 @@ impl super::Opened for Opened {
         let Self { gpu, progress, interrupt } = *self;
         let texels = longest_span(&scene)?;
         progress.stage("uploading the volume");
-        let volume = DeviceVolume::new(&gpu, &scene.volume, plan::enough_to_leap(&scene))?;
+        let volume = DeviceVolume::new(&gpu, &scene, plan::enough_to_leap(&scene))?;
         let lit = scene.shading.as_ref().map(|shading| Lit::new(&gpu, &scene.shell, shading)).transpose()?;
         let solids = Solids::new(&gpu, &scene.solids)?;
         Ok(Box::new(Shell {
@@ -155,10 +155,6 @@ fn sorter<'a>(kept: &'a mut Option<(Arc<Topology>, Sorter)>, shell: &shell::Shel
 }
 
 impl Shell {
-    /// Where a light casts any.
-    fn shadows(&self) -> Option<&Shadows> {
-        self.shadows.iter().flatten().next()
-    }
 }
 
 impl Method for Shell {
@@ -229,24 +225,23 @@ impl Method for Shell {
             }
         };
         let keeps_shadows = self.shadows.is_some();
-        let casts_shadows = self.scene.shading.as_ref().is_some_and(|shading| shading.casts_shadows());
-        if walks || (casts_shadows && !keeps_shadows) {
+        let needs_shadows = self.scene.casts_shadows() && !keeps_shadows;
+        if walks || needs_shadows {
             ways(&mut self.ways, &self.scene.shell).place(&self.gpu, &self.scene.shell)?;
         }
-        if !keeps_shadows {
-            let shadows = Shadows::draw(
+        if let (true, Some(shading), Some(ways)) = (needs_shadows, &self.scene.shading, &self.ways) {
+            self.progress.stage("drawing shadows");
+            self.shadows = Some(Shadows::draw(
                 &self.gpu,
                 &self.scene,
+                shading,
                 &self.volume,
-                self.ways.as_ref(),
+                ways,
                 self.leaps(),
                 &*self.progress,
                 &self.interrupt,
-            )?;
-            if shadows.is_some() {
-                watch.lap("shadows");
-            }
-            self.shadows = Some(shadows);
+            )?);
+            watch.lap("shadows");
         }
         self.progress.stage("uploading the view");
         let kind = self.kind(&sight, &seen, view);
@@ -257,7 +252,7 @@ impl Method for Shell {
         watch.lap("upload");
 
         let constants = constants::constants(&self.scene, view, seen.unit);
-        let shadows = self.shadows();
+        let shadows = self.shadows.as_ref();
         let shadow_textures = shadows.map_or_else(Vec::new, Shadows::textures);
         if let (Some(solids), Some((solid_view, _))) = (&self.solids, &canvas.solids) {
             self.interrupt.check()?;
@@ -327,7 +322,7 @@ impl Method for Shell {
         watch.lap("left");
         let mut report = self.report(&sight, &seen, &rgba);
         report.skipped.extend(kept);
-        if keeps_shadows && shadows.is_some() {
+        if keeps_shadows {
             report.skipped.push("shadows are kept: they do not depend on the camera".into());
         }
         report.counts.insert("pixels_left_to_host".to_owned(), left);

@@ -35,7 +35,7 @@ impl Shell {
         if triangles > 0 {
             count("solid_triangles", triangles);
         }
-        if let Some(shadows) = self.shadows() {
+        if let Some(shadows) = &self.shadows {
             count("shadow_pictures", shadows.pictures() as u64);
         }
         if seen.before_near > 0 {
@@ -74,9 +74,9 @@ impl Shell {
                 seen.minified_squares.len()
             ));
         }
-        match (&self.scene.shading, &self.shadows) {
-            (None, _) => report.skipped.push("the scene is unlit: nothing of light is compiled in".into()),
-            (_, Some(None)) => {
+        match &self.scene.shading {
+            None => report.skipped.push("the scene is unlit: nothing of light is compiled in".into()),
+            Some(_) if !self.scene.casts_shadows() => {
                 report.skipped.push("no light casts shadows: nothing of them is compiled in".into());
             }
             _ => {}

@@ -9,8 +9,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use bytemuck::{Pod, Zeroable};
-use glam::{DMat3, DVec2, DVec3};
-use rayon::prelude::*;
+use glam::DVec3;
 
 use super::constants::{ViewConstants, constants_of_volume};
 use super::lens::{LitByLight, NEAR, PictureFrame, in_its_unit};
@@ -20,9 +19,8 @@ use crate::Result;
 use crate::gpu::{Batch, Buffer, Draw, Gpu, Keeps, Pipeline, PipelineInfo, Sampled, Target, draw, shaders};
 use crate::order::Crossings;
 use crate::progress::{Interrupt, Progress};
-use crate::scene::shading::MOST_LIGHTS;
+use crate::scene::shading::{MOST_LIGHTS, Shading};
 use crate::scene::{LightView, March, Scene, Skip};
-use crate::shell::Shell;
 
 /// `LightPicture` of `glsl/include/picture.glsl`: see there for each member.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Pod, Zeroable)]
@@ -80,8 +78,8 @@ struct CurvePipelines {
 }
 
 impl Shadows {
-    /// Draws the pictures of all lights that cast shadows; `None` where there is no such light. `ways` are placed, of the scene's shell;
-    /// where `leaps`, rays do, over what is empty.
+    /// Draws the pictures of all lights that cast shadows, of which there is one. `ways` are placed, of the scene's shell; where `leaps`,
+    /// rays do, over what is empty.
     ///
     /// # Errors
     /// [`Error::Device`](crate::Error::Device) where the pictures are too large for the device,
@@ -89,16 +87,13 @@ impl Shadows {
     pub fn draw(
         gpu: &Arc<Gpu>,
         scene: &Scene,
+        shading: &Shading,
         volume: &DeviceVolume,
-        ways: Option<&Ways>,
+        ways: &Ways,
         leaps: bool,
         progress: &dyn Progress,
         interrupt: &Interrupt,
-    ) -> Result<Option<Self>> {
-        let Some(shading) = scene.shading.as_ref().filter(|shading| shading.casts_shadows()) else {
-            return Ok(None);
-        };
-        let ways = ways.expect("placed where a light casts shadows");
+    ) -> Result<Self> {
         let (centre, radius) = scene.bounds();
         let mut views = Vec::new();
         let mut ranges = Vec::new();
@@ -107,7 +102,6 @@ impl Shadows {
             views.extend(LightView::of(light, centre, radius, shading.shadow_size));
             ranges.push(first..views.len());
         }
-        progress.stage("drawing shadows");
         let side = shading.shadow_size;
         let columns = (1..).find(|columns| columns * columns >= views.len() as u32).expect("few pictures");
         let rows = (views.len() as u32).div_ceil(columns);
@@ -131,7 +125,7 @@ impl Shadows {
             interrupt.check()
         })?;
         shadows.draw_blockers(gpu, scene, interrupt)?;
-        Ok(Some(shadows))
+        Ok(shadows)
     }
 
     /// How many pictures there are.
@@ -252,7 +246,7 @@ impl Shadows {
                 target: &self.curves,
                 clears: index == 0,
                 buffers: &buffers,
-                textures: &volume.textures(),
+                textures: &volume.textures_of_lights(),
                 push_constants: bytemuck::bytes_of(&constants),
                 batches: &[
                     Batch { pipeline: walk, vertices: vertices.clone() },

@@ -6,25 +6,33 @@ use rayon::prelude::*;
 
 use crate::Result;
 use crate::gpu::{Gpu, Sampled, Texture3d};
-use crate::volume::{Proximity, Pyramid};
+use crate::scene::Scene;
+use crate::volume::Proximity;
 
 /// The volume's texture, and what tells rays where in it nothing is.
 pub struct DeviceVolume {
     /// Of the volume itself.
-    pub texture: Texture3d,
+    texture: Texture3d,
+    /// Of its opacity alone, for lights that cast shadows.
+    alpha: Option<Texture3d>,
     /// Where enough of it is empty.
     proximity: Option<Texture3d>,
     emptiness: f64,
 }
 
 impl DeviceVolume {
-    /// Uploads a volume; and where at least the part `enough` of it is empty, the distances by which rays leap, unless `enough` is
-    /// `None`.
+    /// Uploads the volume of `scene`; and where at least the part `enough` of it is empty, the distances by which rays leap, unless
+    /// `enough` is `None`.
     ///
     /// # Errors
     /// As [`Texture3d::upload`].
-    pub fn new(gpu: &Arc<Gpu>, volume: &Pyramid, enough: Option<f64>) -> Result<Self> {
+    pub fn new(gpu: &Arc<Gpu>, scene: &Scene, enough: Option<f64>) -> Result<Self> {
+        let volume = &scene.volume;
         let texture = Texture3d::upload(gpu, "the volume", volume)?;
+        let alpha = match scene.casts_shadows() {
+            true => Texture3d::upload_alpha(gpu, "the volume's opacity", volume)?,
+            false => None,
+        };
         let full = &volume.levels[0].texels;
         let mut emptiness =
             full.par_iter().filter(|texel| texel[3] == 0.0).count() as f64 / full.len() as f64;
@@ -37,7 +45,7 @@ impl DeviceVolume {
                 proximity = Some(Texture3d::upload_proximity(gpu, "the volume's distances", &distances)?);
             }
         }
-        Ok(Self { texture, proximity, emptiness })
+        Ok(Self { texture, alpha, proximity, emptiness })
     }
 
     /// Whether there are distances by which rays can leap.
@@ -52,7 +60,16 @@ impl DeviceVolume {
 
     /// By the binding that shaders name.
     pub fn textures(&self) -> Vec<(u32, Sampled<'_>)> {
-        let textures = [(8, Some(&self.texture)), (22, self.proximity.as_ref())];
+        self.with(&self.texture)
+    }
+
+    /// The same for shaders that see no colours.
+    pub fn textures_of_lights(&self) -> Vec<(u32, Sampled<'_>)> {
+        self.with(self.alpha.as_ref().unwrap_or(&self.texture))
+    }
+
+    fn with<'a>(&'a self, texture: &'a Texture3d) -> Vec<(u32, Sampled<'a>)> {
+        let textures = [(8, Some(texture)), (22, self.proximity.as_ref())];
         textures
             .into_iter()
             .filter_map(|(binding, texture)| Some((binding, Sampled::Texture(texture?))))
