@@ -1,6 +1,6 @@
 #version 450
 #extension GL_ARB_shading_language_include : require
-// switches: SPARSE
+// switches: SPARSE SOLIDS
 // A pixel of a light's picture: how the medium dims the light along its ray, which walks as the eye's do. What is too much for that is left
 // to shadow_left.frag.glsl.
 
@@ -9,6 +9,7 @@
 #include "medium.glsl"
 #include "sample.glsl"
 #include "picture.glsl"
+#include "blocked.glsl"
 #include "walk.glsl"
 #include "dimming.glsl"
 
@@ -31,10 +32,11 @@ void main() {
     origin = is_parallel ? vec3(place, 0.0) : vec3(0.0);
     vec3 ray = is_parallel ? vec3(0.0, 0.0, 1.0) : vec3(place, 1.0);
     float per_depth = length(ray) * light.opacity_distances;
+    float farthest = blocked_from(gl_FragCoord.xy - light.middle, is_parallel);
     uint passes = 0;
     Walker walker = walker_at(next, last, is_begun, ray, passes);
     while (!walker.strays && passes < MOST_PASSES) {
-        Stretch stretch = go_on(walker, ray, FAR, passes);
+        Stretch stretch = go_on(walker, ray, farthest, passes);
         Steps steps = stretch.steps;
         // It has two ends: see `march_midpoints`.
         for (uint i = stretch.first; i < steps.count;) {

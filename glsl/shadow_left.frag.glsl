@@ -1,6 +1,6 @@
 #version 450
 #extension GL_ARB_shading_language_include : require
-// switches: SPARSE
+// switches: SPARSE SOLIDS
 // A pixel of a light's picture that shadow.frag.glsl has left: of a ray that is in several parts of the shell at once, whose media add,
 // or that strays. By the same means as cycle.frag.glsl.
 
@@ -11,6 +11,7 @@
 #include "sample.glsl"
 #include "gather.glsl"
 #include "picture.glsl"
+#include "blocked.glsl"
 #include "dimming.glsl"
 
 layout(early_fragment_tests) in; // by depth: else all pixels would be gone through
@@ -79,6 +80,7 @@ bool follow(vec3 origin, vec3 ray) {
 
 void main() {
     LightPicture light = light_pictures[picture];
+    farthest = blocked_from(gl_FragCoord.xy - light.middle, light.is_parallel != 0);
     vec2 place = (gl_FragCoord.xy - light.middle) * vec2(light.pixel, -light.pixel);
     vec3 origin = light.is_parallel != 0 ? vec3(place, 0.0) : vec3(0.0);
     vec3 ray = light.is_parallel != 0 ? vec3(0.0, 0.0, 1.0) : vec3(place, 1.0);

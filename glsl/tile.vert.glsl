@@ -7,7 +7,9 @@
 
 layout(set = 0, binding = 1, std430) readonly buffer Tiles { Tile tiles[]; };
 
+#ifndef WALKED
 layout(location = 0) flat out uvec2 members; // range of what is seen there: first, end
+#endif
 #ifdef LIGHT
 layout(location = 1) flat out uint picture;
 #endif
@@ -16,7 +18,9 @@ const uint CORNERS[6] = uint[](0, 1, 2, 0, 2, 3);
 
 void main() {
     Tile tile = tiles[gl_VertexIndex / 6];
+#ifndef WALKED
     members = tile.members;
+#endif
 #ifdef LIGHT
     picture = tile.picture;
 #endif

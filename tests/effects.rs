@@ -359,6 +359,33 @@ fn shadows_agree_with_the_reference() {
     }
 }
 
+/// Where the shell is in itself, media add, for lights as for the eye: two rings that go through one another.
+#[test]
+fn shadows_of_a_shell_that_overlaps_itself_agree_with_the_reference() {
+    let one = Generator::Torus(Torus { segments: 24, rings: 12, ..Torus::default() }).build().unwrap();
+    let mut two = one.clone();
+    let count = one.positions.len() as u32;
+    let turned = |v: DVec3| DVec3::new(v.x, -v.z, v.y);
+    two.positions.extend(one.positions.iter().map(|&at| turned(at) + 0.4 * DVec3::X));
+    two.normals.extend(one.normals.iter().map(|&normal| turned(normal)));
+    two.uvs.extend(&one.uvs);
+    two.triangles.extend(one.triangles.iter().map(|corners| corners.map(|corner| corner + count)));
+    let options = ShellOptions { uv_scale: DVec2::new(6.0, 2.0), ..ShellOptions::new(0.3) };
+    let mut scene = ring();
+    scene.shell = Arc::new(Shell::build(&two, &options).unwrap());
+    scene.solids = [].into();
+    let exact = reference(&scene);
+    let frame = render(&scene);
+    assert!(frame.report.counts["pixels_overlapping"] > 50, "{:?}", frame.report.counts);
+    let error = rmse(&frame.image, &exact);
+    println!("RMSE {error:e}");
+    assert!(error < 5e-3, "{error}");
+    let mut denser = scene.clone();
+    denser.medium.opacity_distance *= 1.15;
+    let apart = rmse(&render(&denser).image, &exact);
+    assert!(apart > 2.0 * error, "how dense the fog is makes no difference: {apart}");
+}
+
 /// Each pixel shows the nearest solid, lit and with its own texture: a ball of more triangles than 16 bits count, on a floor that
 /// reaches behind the eye.
 #[test]

@@ -11,3 +11,11 @@ float blocker_depth(vec3 depth_function, vec2 place, bool is_parallel) {
     float value = depth_function.x + dot(depth_function.yz, place);
     return is_parallel ? value : 1.0 / value;
 }
+
+// The depth beyond which a pixel's ray need not be followed, where this is the triangle at its middle: the pixel is read for places
+// up to a pixel away.
+float deepest_read(vec3 depth_function, vec2 place, bool is_parallel) {
+    float value = depth_function.x + dot(depth_function.yz, place);
+    float slope = abs(depth_function.y) + abs(depth_function.z);
+    return is_parallel ? value + slope : value > slope ? 1.0 / (value - slope) : 3.0e38;
+}

@@ -111,3 +111,75 @@ impl Crossings {
         self.overlapping += if overlaps { pixels } else { 0 };
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::generate::{Generator, Torus};
+    use crate::scene::{Light, Source};
+    use crate::shell::{EXTERIOR, ShellOptions};
+
+    /// Where a ray crosses outer faces, each tried by itself.
+    fn met(shell: &Shell, origin: DVec3, ray: DVec3) -> Vec<u32> {
+        let mut met = Vec::new();
+        for (t, neighbours) in shell.topology.neighbours.iter().enumerate() {
+            for k in (0..4).filter(|&k| neighbours[k] == EXTERIOR) {
+                let at = |id: u32| shell.vertices[id as usize];
+                let [a, b, c] = shell.face(t, k).map(at);
+                let inner = at(shell.topology.tetrahedra[t][k]);
+                let normal = (b - a).cross(c - a);
+                let depth = normal.dot(a - origin) / normal.dot(ray);
+                let point = origin + depth * ray;
+                let is_within = [[a, b], [b, c], [c, a]]
+                    .iter()
+                    .all(|[from, to]| (to - from).cross(point - from).dot(normal) > 0.0);
+                if is_within && depth > 0.0 {
+                    let leaves = normal.dot(ray) * normal.dot(inner - a) < 0.0;
+                    met.push((depth, (4 * t + k) as u32 | if leaves { LEAVES } else { 0 }));
+                }
+            }
+        }
+        met.sort_by(|a, b| a.0.total_cmp(&b.0));
+        met.into_iter().map(|(_, place)| place).collect()
+    }
+
+    #[test]
+    fn rays_of_lights_cross_what_they_meet() {
+        const SIDE: u32 = 24;
+        let mesh = Generator::Torus(Torus { segments: 9, rings: 7, ..Torus::default() }).build().unwrap();
+        let shell = Shell::build(&mesh, &ShellOptions::new(0.2)).unwrap();
+        let faces = FaceTable::new(&shell.topology);
+        let lamp = |position| Source::Point { position, falloff: None };
+        let sources = [
+            Source::Directional { towards: DVec3::new(0.3, 0.9, 0.5).normalize() },
+            Source::Directional { towards: DVec3::new(-0.9, 0.1, 0.2).normalize() },
+            lamp(DVec3::new(0.3, 4.0, 1.7)),
+            lamp(DVec3::new(0.81, 0.07, 0.62)),
+        ];
+        let mut crossed = 0;
+        for source in sources {
+            let light = Light { source, colour: DVec3::ONE, shadow: true };
+            for view in LightView::of(&light, DVec3::ZERO, 2.0, SIDE) {
+                let crossings = Crossings::of_light(&faces, &shell, &view, SIDE);
+                assert_eq!(crossings.of_pixels.len(), (SIDE * SIDE) as usize);
+                let pixels = (0..SIDE).flat_map(|y| (0..SIDE).map(move |x| [x, y]));
+                for ([first, last], pixel) in crossings.of_pixels.iter().zip(pixels) {
+                    let [x, y] =
+                        pixel.map(|pixel| (f64::from(pixel) + 0.5 - 0.5 * f64::from(SIDE)) * view.pixel);
+                    let beside = x * view.frame.right - y * view.frame.up;
+                    let (origin, ray) = match view.is_parallel {
+                        true => (view.origin + beside, view.frame.forward),
+                        false => (view.origin, view.frame.forward + beside),
+                    };
+                    let met = met(&shell, origin, ray);
+                    let range = (first & !(BEGUN | INTRICATE)) as usize..*last as usize;
+                    assert_eq!(crossings.places[range], met, "{source:?}, pixel {pixel:?}");
+                    let leaves = met.iter().filter(|place| **place & LEAVES != 0).count();
+                    assert_eq!(first & BEGUN != 0, 2 * leaves > met.len(), "{source:?}, pixel {pixel:?}");
+                    crossed += met.len();
+                }
+            }
+        }
+        assert!(crossed > 2000, "{crossed}");
+    }
+}

@@ -120,11 +120,12 @@ impl Shadows {
             columns,
             opacity_distance: scene.medium.opacity_distance,
         };
+        // First: rays are followed no farther.
+        shadows.draw_blockers(gpu, scene, interrupt)?;
         shadows.draw_curves(gpu, scene, volume, ways, leaps, &|done| {
             progress.fraction(done);
             interrupt.check()
         })?;
-        shadows.draw_blockers(gpu, scene, interrupt)?;
         Ok(shadows)
     }
 
@@ -146,8 +147,11 @@ impl Shadows {
 
     /// By the binding that shaders name.
     pub fn textures(&self) -> Vec<(u32, Sampled<'_>)> {
-        let blockers = self.blockers.iter().map(|target| (14, Sampled::Picture(target)));
-        [(10, Sampled::Picture(&self.curves))].into_iter().chain(blockers).collect()
+        [(10, Sampled::Picture(&self.curves))].into_iter().chain(self.blocker_texture()).collect()
+    }
+
+    fn blocker_texture(&self) -> Option<(u32, Sampled<'_>)> {
+        self.blockers.as_ref().map(|target| (14, Sampled::Picture(target)))
     }
 
     /// The pictures, for points in world space around `eye` in parts of `unit`: as many of each light, the last of which may hold
@@ -221,6 +225,8 @@ impl Shadows {
             ..ViewConstants::of_volume(&scene.volume)
         };
         let pictures = Buffer::storage(gpu, "the lights' pictures", &self.pictures_of_no_eye())?;
+        let mut textures = volume.textures_of_lights();
+        textures.extend(self.blocker_texture());
         // By whether levels of detail but 0 are needed.
         let mut pipelines: [Option<CurvePipelines>; 2] = [None, None];
         for (index, view) in self.views.iter().enumerate() {
@@ -246,7 +252,7 @@ impl Shadows {
                 target: &self.curves,
                 clears: index == 0,
                 buffers: &buffers,
-                textures: &volume.textures_of_lights(),
+                textures: &textures,
                 push_constants: bytemuck::bytes_of(&constants),
                 batches: &[
                     Batch { pipeline: walk, vertices: vertices.clone() },
@@ -259,26 +265,35 @@ impl Shadows {
     }
 
     fn curve_pipelines(&self, gpu: &Arc<Gpu>, scene: &Scene, leaps: bool, minified: bool) -> Result<CurvePipelines> {
-        let switches: &[&str] = if leaps { &["SPARSE"] } else { &[] };
+        let mut switches = Vec::new();
+        let mut textures = vec![8];
+        if leaps {
+            switches.push("SPARSE");
+            textures.push(22);
+        }
+        if self.blockers.is_some() {
+            switches.push("SOLIDS");
+            textures.push(14);
+        }
         let mut constants = constants_of_volume(March::default(), minified, &scene.volume).to_vec();
         // Of these the last is used: whether rays begin in the shell.
         let is_any_inside = self.views.iter().any(|view| !view.is_parallel);
         constants.extend([0, 0, u32::from(is_any_inside)]);
         let info = PipelineInfo {
             vertex: shaders::TILE_VERT.with(&["LIGHT", "WALKED"]),
-            fragment: shaders::SHADOW_FRAG.with(switches),
+            fragment: shaders::SHADOW_FRAG.with(&switches),
             constants: &constants,
             storage_buffers: &[1, 6],
             uniform_buffers: &[],
             texel_buffers: &[18, 19, 20, 21],
-            textures: if leaps { &[8, 22] } else { &[8] },
+            textures: &textures,
             push_constant_bytes: size_of::<ViewConstants>() as u32,
             keeps: Keeps::Nearest,
         };
         let walk = Pipeline::new(gpu, &self.curves, &info)?;
         let info = PipelineInfo {
             vertex: shaders::TILE_VERT.with(&["LIGHT"]),
-            fragment: shaders::SHADOW_LEFT_FRAG.with(switches),
+            fragment: shaders::SHADOW_LEFT_FRAG.with(&switches),
             storage_buffers: &[0, 1, 2, 6],
             texel_buffers: &[],
             ..info
