@@ -9,14 +9,11 @@
 #include "medium.glsl"
 #include "sample.glsl"
 #include "picture.glsl"
-#include "blocked.glsl"
-#include "walk.glsl"
+#include "light_ray.glsl"
 #include "dimming.glsl"
+#include "walk.glsl"
 
 layout(location = 1) flat in uint picture;
-
-// Of lavapipe through loops, for a sample: those over samples and over knots.
-const uint PASSES_A_SAMPLE = 3;
 
 void main() {
     LightPicture light = light_pictures[picture];
@@ -24,19 +21,19 @@ void main() {
     int last;
     bool is_begun;
     bool is_left = crossings_of(uvec2(gl_FragCoord.xy - (light.middle - light.half_side)), next, last, is_begun);
-    // Without crossings a ray that is left soon stops, should it run on with those of neighbouring pixels.
-    if (is_left) last = next;
-    vec2 place = (gl_FragCoord.xy - light.middle) * vec2(light.pixel, -light.pixel);
-    is_parallel = light.is_parallel != 0;
+    if (is_left) {
+        last = next;
+        is_begun = false;
+    }
+    LightRay ray = ray_of(light);
+    origin = ray.origin;
     pixel_size = light.pixel;
-    origin = is_parallel ? vec3(place, 0.0) : vec3(0.0);
-    vec3 ray = is_parallel ? vec3(0.0, 0.0, 1.0) : vec3(place, 1.0);
-    float per_depth = length(ray) * light.opacity_distances;
-    float farthest = blocked_from(gl_FragCoord.xy - light.middle, is_parallel);
+    is_parallel = light.is_parallel != 0;
+    float per_depth = length(ray.along) * light.opacity_distances;
     uint passes = 0;
-    Walker walker = walker_at(next, last, is_begun, ray, passes);
+    Walker walker = walker_at(next, last, is_begun, ray.along, passes);
     while (!walker.strays && passes < MOST_PASSES) {
-        Stretch stretch = go_on(walker, ray, farthest, passes);
+        Stretch stretch = go_on(walker, ray.along, ray.farthest, passes);
         Steps steps = stretch.steps;
         // It has two ends: see `march_midpoints`.
         for (uint i = stretch.first; i < steps.count;) {

@@ -11,7 +11,7 @@
 #include "sample.glsl"
 #include "gather.glsl"
 #include "picture.glsl"
-#include "blocked.glsl"
+#include "light_ray.glsl"
 #include "dimming.glsl"
 
 layout(early_fragment_tests) in; // by depth: else all pixels would be gone through
@@ -79,11 +79,8 @@ bool follow(vec3 origin, vec3 ray) {
 }
 
 void main() {
-    LightPicture light = light_pictures[picture];
-    farthest = blocked_from(gl_FragCoord.xy - light.middle, light.is_parallel != 0);
-    vec2 place = (gl_FragCoord.xy - light.middle) * vec2(light.pixel, -light.pixel);
-    vec3 origin = light.is_parallel != 0 ? vec3(place, 0.0) : vec3(0.0);
-    vec3 ray = light.is_parallel != 0 ? vec3(0.0, 0.0, 1.0) : vec3(place, 1.0);
-    if (follow(origin, ray)) write_curve();
+    LightRay ray = ray_of(light_pictures[picture]);
+    farthest = ray.farthest;
+    if (follow(ray.origin, ray.along)) write_curve();
     else leave_unresolved();
 }

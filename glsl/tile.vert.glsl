@@ -30,7 +30,7 @@ void main() {
 #ifdef WALKED
     const float nearness = 1.0;
 #else
-    const float nearness = 0.5; // where rays walk, only what they have left is drawn then
+    const float nearness = 0.5; // where a depth is kept, that of pixels for which it was drawn as WALKED is nearer
 #endif
     gl_Position = vec4(right ? tile.bounds.z : tile.bounds.x, low ? tile.bounds.w : tile.bounds.y, nearness, 1.0);
 }

@@ -55,7 +55,6 @@ void main() {
     int first;
     int last;
     bool is_begun;
-    // Where several pixels run at once, those that are discarded may run on with the others: without crossings they soon stop.
     if (!crossings_of(uvec2(gl_FragCoord.xy), first, last, is_begun)) last = first;
     if (first == last) discard;
     vec3 ray = pixel_ray();

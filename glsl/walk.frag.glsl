@@ -22,7 +22,6 @@ void main() {
     int last;
     bool is_begun;
     bool is_intricate = crossings_of(uvec2(gl_FragCoord.xy), next, last, is_begun);
-    // Where several pixels run at once, those that are discarded may run on with the others: without crossings they soon stop.
     if (is_intricate) last = next;
     if (next == last) discard;
     vec3 ray = pixel_ray();

@@ -386,6 +386,31 @@ fn shadows_of_a_shell_that_overlaps_itself_agree_with_the_reference() {
     assert!(apart > 2.0 * error, "how dense the fog is makes no difference: {apart}");
 }
 
+/// A lamp in the fog itself, whose rays begin in the shell, beside a plate that it and a low sun hardly graze: rays of lights end at
+/// solids, though no sooner than fog is seen before them.
+#[test]
+fn a_lamp_in_the_fog_and_a_steep_plate_agree_with_the_reference() {
+    let mut scene = ring();
+    scene.solids = [plate(DVec3::new(0.9, 0.31, 0.4), 0.8, DVec3::new(0.8, 0.3, 0.2))].into();
+    let shading = scene.shading.as_mut().unwrap();
+    shading.lights = vec![sun(DVec3::new(0.9, 0.12, 0.3), 2.0), lamp(DVec3::new(1.0, 0.45, 0.1), 1.0)];
+    shading.shadow_size = 256;
+    let inside = scene.shell.vertices.iter().map(|vertex| vertex.distance(DVec3::new(1.0, 0.45, 0.1)));
+    assert!(inside.fold(f64::INFINITY, f64::min) < 0.15);
+    let exact = reference(&scene);
+    let image = render(&scene).image;
+    let error = rmse(&image, &exact);
+    println!("RMSE {error:e}");
+    assert!(error < 5e-3, "{error}");
+    for light in 0..2 {
+        let mut changed = scene.clone();
+        changed.shading.as_mut().unwrap().lights[light].shadow = false;
+        let apart = rmse(&render(&changed).image, &exact);
+        println!("without the shadow of light {light}: {apart:e}");
+        assert!(apart > 2.0 * error, "the shadow of light {light} makes no difference: {apart}");
+    }
+}
+
 /// Each pixel shows the nearest solid, lit and with its own texture: a ball of more triangles than 16 bits count, on a floor that
 /// reaches behind the eye.
 #[test]

@@ -162,6 +162,8 @@ fn nothing_is_compiled_in_that_a_scene_does_not_need() {
     assert_eq!(bindings(shaders::WALK_FRAG.with(&[])), [8, 18, 19, 20, 21]);
     assert_eq!(bindings(shaders::SHADOW_FRAG.with(&[])), [6, 8, 18, 19, 20, 21]);
     assert_eq!(bindings(shaders::SHADOW_LEFT_FRAG.with(&[])), [0, 2, 6, 8]);
+    assert_eq!(bindings(shaders::SHADOW_FRAG.with(&["SOLIDS"])), [6, 8, 14, 18, 19, 20, 21]);
+    assert_eq!(bindings(shaders::SHADOW_LEFT_FRAG.with(&["SOLIDS"])), [0, 2, 6, 8, 14]);
     assert_eq!(shell(&["SOLIDS"]), [8, 15]);
     assert_eq!(shell(&["LIT"]), [3, 5, 8, 9]);
     assert_eq!(shell(&["LIT", "SHADOWS"]), [3, 5, 6, 8, 9, 10]);

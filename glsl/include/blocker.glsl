@@ -6,6 +6,10 @@ struct Blocker {
     uint picture;
 };
 
+#ifdef SOLIDS
+layout(set = 0, binding = 14) uniform sampler2D blockers;
+#endif
+
 // Where a place in the picture, in pixels from its middle, lies on the triangle's plane.
 float blocker_depth(vec3 depth_function, vec2 place, bool is_parallel) {
     float value = depth_function.x + dot(depth_function.yz, place);

@@ -13,6 +13,9 @@ const float LEFT = 0.125;
 // Shorter steps than any; keeps an infinite extinction times nothing from being no number.
 const float LEAST = 1e-30;
 
+// Passes through loops that lavapipe makes for a sample: those over samples and over knots.
+const uint PASSES_A_SAMPLE = 3;
+
 float knots[KNOTS];
 uint placed = 0;
 float growth = LEAST_GROWTH;

@@ -6,7 +6,6 @@
 layout(set = 0, binding = 10) uniform sampler2DArray curves;
 #ifdef SOLIDS
 #include "blocker.glsl"
-layout(set = 0, binding = 14) uniform sampler2D blockers;
 #endif
 
 // How many of the growths from knot to knot are done at a depth; knots may coincide.

@@ -18,13 +18,14 @@ const uint BEGUN = 0x40000000u;
 
 layout(constant_id = 6) const float SATURATED = 0.0; // where no more is let through the rest is not looked at
 
-// Passes through loops after which a pixel is left to the host. lavapipe runs eight pixels at once, all of them as often as the
+// Passes through loops after which a pixel is left: an eye's to the host. lavapipe runs eight pixels at once, all of them as often as the
 // one that needs it most, and ends all loops after 65,535 passes.
 const uint MOST_PASSES = 8000;
 
 const float FAR = 3.0e38;
 
-// By how much of itself a depth may be off, for rounding: 2^-18.
+// How far off a height over a plane may be, for rounding: 2^-18 of it, or of a light's rays, whose heights are differences of numbers up
+// to 1, of that.
 const float STRAY = 3.814697265625e-6;
 
 #ifdef LIGHT
@@ -32,24 +33,25 @@ const float STRAY = 3.814697265625e-6;
 vec3 origin = vec3(0.0);
 float pixel_size = 0.0;
 bool is_parallel = false;
-
-float height_of(vec4 plane) {
-    return plane.w - dot(plane.xyz, origin);
-}
-
-// Whether a ray is surely on the outer side of a plane at a depth. Heights are differences of numbers up to 1, and off by parts of that.
-bool is_outside(float height, float towards_inside, float depth) {
-    return height > depth * towards_inside + STRAY;
-}
-#else
-float height_of(vec4 plane) {
-    return plane.w;
-}
-
-bool is_outside(float height, float towards_inside, float depth) {
-    return height > depth * (1.0 + STRAY) * towards_inside;
-}
 #endif
+
+// Over the ray's start.
+float height_of(vec4 plane) {
+#ifdef LIGHT
+    return plane.w - dot(plane.xyz, origin);
+#else
+    return plane.w;
+#endif
+}
+
+// Whether a ray is surely on the outer side of a plane at a depth.
+bool is_outside(float height, float towards_inside, float depth) {
+#ifdef LIGHT
+    return height > depth * towards_inside + STRAY;
+#else
+    return height > depth * (1.0 + STRAY) * towards_inside;
+#endif
+}
 
 vec4 plane_at(uint place) {
     return texelFetch(cells, int((place >> 2) * 9 + 2 + (place & 3)));
@@ -69,7 +71,8 @@ Path path_of(uint cell, vec3 ray) {
 #endif
 }
 
-// The crossings of a pixel, from `next` to before `last`; returns whether its ray is intricate.
+// The crossings of a pixel, from `next` to before `last`; returns whether its ray is intricate. Where several pixels run at once, those
+// that are discarded may run on with the others: so that they soon stop, they should have no crossings then.
 bool crossings_of(uvec2 pixel, out int next, out int last, out bool is_begun) {
     uvec2 range = texelFetch(of_pixels, int(pixel.y * uint(2.0 * view.centre.x) + pixel.x)).xy;
     next = int(range.x & ~(INTRICATE | BEGUN));
@@ -79,7 +82,7 @@ bool crossings_of(uvec2 pixel, out int next, out int last, out bool is_begun) {
 }
 
 // Parts of the shell may touch at faces that know nothing of one another, and rays may lie in the planes of those. Then f32 takes
-// them to cross such a face anywhere, out into nothing or in from it. Such rays are left to the host.
+// them to cross such a face anywhere, out into nothing or in from it. Such rays are left.
 
 // Below this cosine a face is met too flatly.
 const float FLAT = 1e-4;
@@ -121,13 +124,9 @@ bool enters(Faces faces, vec3 ray, out float depth) {
 // Whether a ray that leaves the shell by `exit`, after this depth, leaves it as it should: at `leave`, or as deep.
 bool leaves(float depth, uint exit, uint leave, vec3 ray) {
     vec4 face = plane_at(leave);
-    float towards_inside = dot(face.xyz, ray);
-#ifdef LIGHT
-    bool is_beyond = depth * towards_inside < height_of(face) + STRAY;
-#else
-    bool is_beyond = depth > face.w / towards_inside * (1.0 - STRAY);
-#endif
-    return -towards_inside > FLAT * length(ray) && (exit == leave || is_beyond);
+    float towards_outside = -dot(face.xyz, ray);
+    bool is_as_deep = !is_outside(-height_of(face), towards_outside, depth);
+    return towards_outside > FLAT * length(ray) && (exit == leave || is_as_deep);
 }
 
 // Where a ray leaves the tetrahedron that it has entered by the first of these faces, and how deep; NOWHERE where rounding, or
@@ -189,6 +188,14 @@ struct Stretch {
     uint first;
 };
 
+Stretch nothing_passed() {
+#ifdef LIGHT
+    return Stretch(0, Path(vec3(0.0), vec3(0.0), 0.0, is_parallel), no_steps(), 0);
+#else
+    return Stretch(0, Path(vec3(0.0), vec3(0.0), 0.0), no_steps(), 0);
+#endif
+}
+
 Walker walker_at(int next, int last, bool is_begun, vec3 ray, inout uint passes) {
     Walker walker = Walker(next, last, NOWHERE, view.near, false, false);
     if (is_begun) {
@@ -201,9 +208,7 @@ Walker walker_at(int next, int last, bool is_begun, vec3 ray, inout uint passes)
 // On to the next tetrahedron in which something may be seen, before `farthest`. Where several pixels run at once, all of them wait here
 // for one another, and march together then.
 Stretch go_on(inout Walker walker, vec3 ray, float farthest, inout uint passes) {
-    Stretch stretch;
-    stretch.cell = 0;
-    stretch.path.detail = 0.0;
+    Stretch stretch = nothing_passed();
     while (passes < MOST_PASSES) {
         passes++;
         stretch.first = 0;
@@ -222,7 +227,8 @@ Stretch go_on(inout Walker walker, vec3 ray, float farthest, inout uint passes) 
         Faces faces = faces_at(walker.place, ray);
         if (is_entering) {
             float depth;
-            walker.strays = walker.strays || !enters(faces, ray, depth);
+            bool is_sound = enters(faces, ray, depth) || depth >= farthest;
+            walker.strays = walker.strays || !is_sound;
             walker.from = max(walker.from, depth);
         }
         float depth;
@@ -231,6 +237,13 @@ Stretch go_on(inout Walker walker, vec3 ray, float farthest, inout uint passes) 
         if (exit != NOWHERE && segment.y > segment.x) {
             stretch.path = path_of(stretch.cell, ray);
             stretch.steps = steps_of(stretch.path, segment);
+#ifdef LIGHT
+            // That an eye's rays have fewer the host has seen to.
+            if (stretch.steps.count >= (MOST_PASSES - passes) / PASSES_A_SAMPLE) {
+                stretch.steps.count = 0;
+                passes = MOST_PASSES;
+            }
+#endif
             stretch.first = seek(stretch.path, stretch.steps, 0, passes);
             walker.from = segment.y;
         }

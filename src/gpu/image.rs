@@ -30,11 +30,11 @@ impl DeviceImage {
         view_type: vk::ImageViewType,
         aspect: vk::ImageAspectFlags,
     ) -> Result<Self> {
-        Self::mapped(gpu, name, info, view_type, aspect, vk::ComponentMapping::default())
+        Self::with_channels(gpu, name, info, view_type, aspect, vk::ComponentMapping::default())
     }
 
     /// The same, whose texels are seen with other channels.
-    pub(super) fn mapped(
+    pub(super) fn with_channels(
         gpu: &Arc<Gpu>,
         name: &str,
         info: &vk::ImageCreateInfo<'_>,

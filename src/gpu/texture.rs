@@ -39,7 +39,8 @@ const SAMPLING: Use = (
 
 /// What a device can do with textures that it filters.
 const FILTERED: vk::FormatFeatureFlags = vk::FormatFeatureFlags::from_raw(
-    vk::FormatFeatureFlags::SAMPLED_IMAGE_FILTER_LINEAR.as_raw() | vk::FormatFeatureFlags::TRANSFER_DST.as_raw(),
+    vk::FormatFeatureFlags::SAMPLED_IMAGE_FILTER_LINEAR.as_raw()
+        | vk::FormatFeatureFlags::TRANSFER_DST.as_raw(),
 );
 
 /// A mip level: its size, and its texels as `T`, u fastest.
@@ -134,6 +135,8 @@ impl Texture3d {
         let levels = u32::try_from(pyramid.len()).expect("at most 32 levels");
         let encoded: Vec<Cow<'_, [u8]>> = pyramid.iter().map(|(_, texels)| encode(texels)).collect();
         let bytes = encoded.iter().map(|texels| texels.len() as u64).sum();
+        // Once on the device, once in the staging buffer.
+        gpu.check_memory(name, 2 * bytes)?;
         let mut staging = Buffer::staging(gpu, name, bytes)?;
         let info = vk::ImageCreateInfo::default()
             .image_type(vk::ImageType::TYPE_3D)
@@ -145,7 +148,8 @@ impl Texture3d {
             .tiling(vk::ImageTiling::OPTIMAL)
             .usage(vk::ImageUsageFlags::SAMPLED | vk::ImageUsageFlags::TRANSFER_DST);
         let colour = vk::ImageAspectFlags::COLOR;
-        let image = DeviceImage::mapped(gpu, name, &info, vk::ImageViewType::TYPE_3D, colour, channels)?;
+        let image =
+            DeviceImage::with_channels(gpu, name, &info, vk::ImageViewType::TYPE_3D, colour, channels)?;
 
         let mut regions = Vec::new();
         let mut offset = 0;

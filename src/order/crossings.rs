@@ -45,13 +45,10 @@ impl Crossings {
     /// The same of the picture of a light, `side` pixels a side. Parallel rays are those of an eye that a projective map has brought in
     /// from infinity: it takes planes to planes, and keeps what is in front of what.
     pub fn of_light(faces: &FaceTable, shell: &Shell, light: &LightView, side: u32) -> Self {
-        let pixel = if light.is_parallel { light.pixel / light.far } else { light.pixel };
         let from_light = |&vertex: &DVec3| {
-            let offset = (vertex - light.origin) / light.far;
-            let [right, up, depth] =
-                [light.frame.right, light.frame.up, light.frame.forward].map(|axis| axis.dot(offset));
+            let DVec3 { x: right, y: up, z: depth } = light.place(vertex);
             if light.is_parallel {
-                // Depths are 0 to 1; twice that is as far as any.
+                // The inverse of the new depth falls with the depth, and is positive: depths are 0 to 1.
                 DVec3::new(right, -up, 1.0) / (2.0 - depth)
             } else {
                 DVec3::new(right, -up, depth)
@@ -59,7 +56,7 @@ impl Crossings {
         };
         let vertices: Vec<DVec3> = shell.vertices.par_iter().with_min_len(1024).map(from_light).collect();
         let boundary = faces.boundary(&shell.determinants, &vertices, DVec3::ZERO);
-        let raster = Raster { width: side as usize, height: side as usize, pixel };
+        let raster = Raster { width: side as usize, height: side as usize, pixel: light.pixel_of_far() };
         Self::of(&ABuffer::new(&vertices, &boundary, raster))
     }
 

@@ -74,6 +74,18 @@ impl LightView {
     }
 }
 
+impl LightView {
+    /// Distance of pixel centres in parts of `far`: of parallel rays, else at depth 1.
+    pub fn pixel_of_far(&self) -> f64 {
+        if self.is_parallel { self.pixel / self.far } else { self.pixel }
+    }
+
+    /// A point of world space relative to the origin, in parts of `far`: to the right, upwards, and forward.
+    pub fn place(&self, point: DVec3) -> DVec3 {
+        self.frame.view_from_world() * (point - self.origin) / self.far
+    }
+}
+
 /// Any axes with this forward, a unit vector.
 fn looking_along(forward: DVec3) -> CameraFrame {
     let up = forward.any_orthonormal_vector();

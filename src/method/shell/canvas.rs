@@ -162,7 +162,7 @@ impl Shell {
             ("SOLIDS", self.solids.is_some()),
             ("SPARSE", self.leaps()),
             ("LIT", self.lit.is_some()),
-            ("SHADOWS", self.shadows.as_ref().is_some()),
+            ("SHADOWS", self.shadows.is_some()),
         ];
         let skips = self.scene.skips;
         let minified = seen.minified || !skips.allow(Skip::Levels);

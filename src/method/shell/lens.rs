@@ -11,7 +11,8 @@ use crate::shell::Shell;
 /// The side of a [`Tile`] in pixels: a power of two. Where many tetrahedra are seen in one, it is smaller.
 const TILE: u32 = 16;
 
-/// Tetrahedra in a tile from which on it is too large, unless it is a pixel already: every pixel of it tries them all, a few times,
+/// Tetrahedra in a tile from which on it is too large, unless it is a pixel already: every pixel of it whose ray does not
+/// walk tries them all, a few times,
 /// and gives up after `MOST_PASSES` of `glsl/include/gather.glsl`.
 const CROWD: usize = 4096;
 
@@ -20,7 +21,7 @@ const CROWD: usize = 4096;
 pub(super) const NEAR: f32 = 1e-6;
 
 /// What a light sees.
-pub(super) struct LitByLight {
+pub(super) struct SeenByLight {
     /// One a tetrahedron; zeros for those that are not seen.
     pub cells: Vec<Cell>,
     /// Those in which something is seen.
@@ -50,39 +51,39 @@ struct Member {
     minified: bool,
 }
 
-impl LitByLight {
+impl SeenByLight {
     /// Maps all tetrahedra of `scene` that have a volume.
     pub fn new(scene: &Scene, view: &LightView, frame: &PictureFrame) -> Self {
         let lens = Lens::new(view, frame.side);
         let mut cells = vec![Cell::zeroed(); scene.shell.topology.tetrahedra.len()];
         let map = |(t, cell): (usize, &mut Cell)| {
-            let (seen, bounds, minified) = lens.cell(scene, t)?;
-            *cell = seen;
+            let (mapped, bounds, minified) = lens.cell(scene, t)?;
+            *cell = mapped;
             Some(Member { tetrahedron: t as u32, bounds, minified })
         };
         let mut members: Vec<Member> = cells.par_iter_mut().enumerate().filter_map(map).collect();
         // Members that come about nearest first are sorted quickly in every pixel.
         members.par_sort_by(|a, b| a.bounds.nearest.total_cmp(&b.bounds.nearest));
         let minified = members.iter().any(|member| member.minified);
-        let mut lit = Self { cells, tiles: Vec::new(), members: Vec::new(), minified };
+        let mut seen = Self { cells, tiles: Vec::new(), members: Vec::new(), minified };
         let (tile_side, inside) = tiled(frame.side, &members);
         let across = frame.side.div_ceil(tile_side);
         for tile in inside.chunk_by(|a, b| a.0 == b.0) {
-            let first = lit.members.len() as u32;
-            lit.members.extend(tile.iter().map(|&(_, place)| members[place as usize].tetrahedron));
+            let first = seen.members.len() as u32;
+            seen.members.extend(tile.iter().map(|&(_, place)| members[place as usize].tetrahedron));
             let [x, y] = [tile[0].0 % across * tile_side, tile[0].0 / across * tile_side];
             let clip = |axis: usize, pixel: u32| {
                 let in_image = frame.corner[axis] + pixel.min(frame.side);
                 (2.0 * f64::from(in_image) / f64::from(frame.image[axis]) - 1.0) as f32
             };
-            lit.tiles.push(Tile {
+            seen.tiles.push(Tile {
                 bounds: [clip(0, x), clip(1, y), clip(0, x + tile_side), clip(1, y + tile_side)],
-                members: [first, lit.members.len() as u32],
+                members: [first, seen.members.len() as u32],
                 picture: frame.index as u32,
                 padding: 0,
             });
         }
-        lit
+        seen
     }
 }
 
@@ -107,11 +108,6 @@ fn tiled(side: u32, members: &[Member]) -> (u32, Vec<(u32, u32)>) {
         }
         tile_side /= 2;
     }
-}
-
-/// Distance of pixel centres, at depth 1 or of parallel rays, in parts of the picture's depth.
-pub(super) fn in_its_unit(view: &LightView) -> f64 {
-    if view.is_parallel { view.pixel / view.far } else { view.pixel }
 }
 
 /// Where a tetrahedron is in a light's picture.
@@ -143,7 +139,7 @@ impl<'a> Lens<'a> {
         }
         let unit = self.view.far;
         let corners = scene.shell.vertices_of(t);
-        let corners = corners.map(|corner| self.light_from_world * (corner - self.view.origin) / unit);
+        let corners = corners.map(|corner| self.view.place(corner));
         let bounds = self.bounds(&corners)?;
         let planes = scene.shell.planes(t);
         let planes = std::array::from_fn(|k| {
@@ -165,7 +161,7 @@ impl<'a> Lens<'a> {
         } else {
             corners.iter().map(|corner| corner.length()).fold(0.0, f64::max)
         };
-        let footprint = scene.medium.lod_footprint * in_its_unit(self.view) * farthest;
+        let footprint = scene.medium.lod_footprint * self.view.pixel_of_far() * farthest;
         let cell = Cell { outline: [[0.0; 4]; 2], planes, texture: rows };
         Some((cell, bounds, footprint * densest > 1.0))
     }
@@ -179,7 +175,7 @@ impl<'a> Lens<'a> {
         }
         let (mut low, mut high) = (DVec2::splat(f64::INFINITY), DVec2::splat(f64::NEG_INFINITY));
         let mut include = |point: DVec3| {
-            let scale = in_its_unit(self.view) * if self.view.is_parallel { 1.0 } else { point.z };
+            let scale = self.view.pixel_of_far() * if self.view.is_parallel { 1.0 } else { point.z };
             let place = DVec2::new(point.x, -point.y) / scale + 0.5 * self.side;
             (low, high) = (low.min(place), high.max(place));
         };

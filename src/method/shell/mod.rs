@@ -119,7 +119,7 @@ impl super::Opened for Opened {
         let Self { gpu, progress, interrupt } = *self;
         let texels = longest_span(&scene)?;
         progress.stage("uploading the volume");
-        let volume = DeviceVolume::new(&gpu, &scene, plan::enough_to_leap(&scene))?;
+        let volume = DeviceVolume::new(&gpu, &scene.volume, plan::enough_to_leap(&scene))?;
         let lit = scene.shading.as_ref().map(|shading| Lit::new(&gpu, &scene.shell, shading)).transpose()?;
         let solids = Solids::new(&gpu, &scene.solids)?;
         Ok(Box::new(Shell {
@@ -152,9 +152,6 @@ fn sorter<'a>(kept: &'a mut Option<(Arc<Topology>, Sorter)>, shell: &shell::Shel
     let kept_sorter = kept.take().filter(|(topology, _)| Arc::ptr_eq(topology, &shell.topology));
     let new = || (shell.topology.clone(), Sorter::new(&shell.topology));
     &kept.insert(kept_sorter.unwrap_or_else(new)).1
-}
-
-impl Shell {
 }
 
 impl Method for Shell {
@@ -229,12 +226,12 @@ impl Method for Shell {
         if walks || needs_shadows {
             ways(&mut self.ways, &self.scene.shell).place(&self.gpu, &self.scene.shell)?;
         }
-        if let (true, Some(shading), Some(ways)) = (needs_shadows, &self.scene.shading, &self.ways) {
+        if needs_shadows {
             self.progress.stage("drawing shadows");
+            let ways = self.ways.as_ref().expect("placed just now");
             self.shadows = Some(Shadows::draw(
                 &self.gpu,
                 &self.scene,
-                shading,
                 &self.volume,
                 ways,
                 self.leaps(),

@@ -3,7 +3,7 @@
 //! depend on no eye, and are drawn once.
 //!
 //! Dufort, Leblanc, Poulin 2005, section 5.3, read an opaque shadow map at every sample, and give transmittance up as too costly.
-//! Here the map holds transmittance as a function of depth (Lokovic, Veach 2000), which one pass over the shell makes.
+//! Here the map holds transmittance as a function of depth (Lokovic, Veach 2000): rays of lights walk through the shell as the eye's do, once.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -12,14 +12,14 @@ use bytemuck::{Pod, Zeroable};
 use glam::DVec3;
 
 use super::constants::{ViewConstants, constants_of_volume};
-use super::lens::{LitByLight, NEAR, PictureFrame, in_its_unit};
+use super::lens::{NEAR, PictureFrame, SeenByLight};
 use super::volume::DeviceVolume;
 use super::walk::{RayBuffers, Ways};
 use crate::Result;
 use crate::gpu::{Batch, Buffer, Draw, Gpu, Keeps, Pipeline, PipelineInfo, Sampled, Target, draw, shaders};
 use crate::order::Crossings;
 use crate::progress::{Interrupt, Progress};
-use crate::scene::shading::{MOST_LIGHTS, Shading};
+use crate::scene::shading::MOST_LIGHTS;
 use crate::scene::{LightView, March, Scene, Skip};
 
 /// `LightPicture` of `glsl/include/picture.glsl`: see there for each member.
@@ -78,7 +78,7 @@ struct CurvePipelines {
 }
 
 impl Shadows {
-    /// Draws the pictures of all lights that cast shadows, of which there is one. `ways` are placed, of the scene's shell; where `leaps`,
+    /// Draws the pictures of all lights that cast shadows, of which there is at least one. `ways` are placed, of the scene's shell; where `leaps`,
     /// rays do, over what is empty.
     ///
     /// # Errors
@@ -87,13 +87,13 @@ impl Shadows {
     pub fn draw(
         gpu: &Arc<Gpu>,
         scene: &Scene,
-        shading: &Shading,
         volume: &DeviceVolume,
         ways: &Ways,
         leaps: bool,
         progress: &dyn Progress,
         interrupt: &Interrupt,
     ) -> Result<Self> {
+        let shading = scene.shading.as_ref().expect("a light casts shadows");
         let (centre, radius) = scene.bounds();
         let mut views = Vec::new();
         let mut ranges = Vec::new();
@@ -112,6 +112,7 @@ impl Shadows {
             })
         };
         let mut shadows = Self {
+            // Rays that have walked are marked by their depth: only the others are gone through again.
             curves: target(1 + PARTS, true)?,
             blockers: if scene.solids.is_empty() { None } else { Some(target(1, true)?) },
             views,
@@ -192,7 +193,7 @@ impl Shadows {
         LightPicture {
             middle: self.corner(index).map(|pixel| pixel as f32 + half_side),
             half_side,
-            pixel: in_its_unit(view) as f32,
+            pixel: view.pixel_of_far() as f32,
             is_parallel: view.is_parallel.into(),
             opacity_distances: (view.far / self.opacity_distance) as f32,
             ..LightPicture::default()
@@ -225,29 +226,41 @@ impl Shadows {
             ..ViewConstants::of_volume(&scene.volume)
         };
         let pictures = Buffer::storage(gpu, "the lights' pictures", &self.pictures_of_no_eye())?;
-        let mut textures = volume.textures_of_lights();
+        let mut textures = volume.textures_of_lights(gpu, &scene.volume)?;
         textures.extend(self.blocker_texture());
         // By whether levels of detail but 0 are needed.
         let mut pipelines: [Option<CurvePipelines>; 2] = [None, None];
         for (index, view) in self.views.iter().enumerate() {
-            let frame = PictureFrame { index, corner: self.corner(index), image: self.curves.size(), side: self.side };
-            let lit = LitByLight::new(scene, view, &frame);
+            between(index as f64 / self.views.len() as f64)?;
+            let frame = PictureFrame {
+                index,
+                corner: self.corner(index),
+                image: self.curves.size(),
+                side: self.side,
+            };
+            let seen = SeenByLight::new(scene, view, &frame);
+            if seen.tiles.is_empty() && index > 0 {
+                continue; // the first clears the image
+            }
             let crossings = Crossings::of_light(ways.faces(), &scene.shell, view, self.side);
-            let minified = lit.minified || !scene.skips.allow(Skip::Levels);
+            let minified = seen.minified || !scene.skips.allow(Skip::Levels);
             let pipelines = &mut pipelines[usize::from(minified)];
             if pipelines.is_none() {
                 *pipelines = Some(self.curve_pipelines(gpu, scene, leaps, minified)?);
             }
             let CurvePipelines { walk, left } = pipelines.as_ref().expect("made just now");
-            let cells = Buffer::floats(gpu, "a light's tetrahedra", &lit.cells)?;
-            let cells_of_left = Buffer::storage(gpu, "a light's tetrahedra", &lit.cells)?;
-            let tiles = Buffer::storage(gpu, "a light's tiles", &lit.tiles)?;
-            let members = Buffer::storage(gpu, "the members of a light's tiles", &lit.members)?;
-            let rays = RayBuffers::new(gpu, &crossings)?;
-            let mut buffers = vec![(0, &cells_of_left), (1, &tiles), (2, &members), (6, &pictures), (18, &cells)];
+            let cells = Buffer::floats(gpu, "a light's tetrahedra", &seen.cells)?;
+            let cells_of_left =
+                Buffer::storage(gpu, "a light's tetrahedra, for rays that are left", &seen.cells)?;
+            let tiles = Buffer::storage(gpu, "a light's tiles", &seen.tiles)?;
+            let members = Buffer::storage(gpu, "the members of a light's tiles", &seen.members)?;
+            let rays = RayBuffers::new(gpu, &crossings)
+                .map_err(|error| error.with_help("make shading.shadow_size smaller"))?;
+            let mut buffers =
+                vec![(0, &cells_of_left), (1, &tiles), (2, &members), (6, &pictures), (18, &cells)];
             buffers.push((19, ways.beyond()));
             buffers.extend(rays.buffers());
-            let vertices = 0..6 * lit.tiles.len() as u32;
+            let vertices = 0..6 * seen.tiles.len() as u32;
             draw(&Draw {
                 target: &self.curves,
                 clears: index == 0,
@@ -264,7 +277,13 @@ impl Shadows {
         Ok(())
     }
 
-    fn curve_pipelines(&self, gpu: &Arc<Gpu>, scene: &Scene, leaps: bool, minified: bool) -> Result<CurvePipelines> {
+    fn curve_pipelines(
+        &self,
+        gpu: &Arc<Gpu>,
+        scene: &Scene,
+        leaps: bool,
+        minified: bool,
+    ) -> Result<CurvePipelines> {
         let mut switches = Vec::new();
         let mut textures = vec![8];
         if leaps {
@@ -350,10 +369,10 @@ impl Shadows {
 
 /// `None` where the light sees the triangle edge-on.
 fn blocker(view: &LightView, corners: [DVec3; 3], picture: u32) -> Option<Blocker> {
-    let [a, b, c] = corners.map(|corner| view.frame.view_from_world() * (corner - view.origin) / view.far);
+    let [a, b, c] = corners.map(|corner| view.place(corner));
     let normal = (b - a).cross(c - a).normalize_or_zero();
     let height = normal.dot(a);
-    let pixel = in_its_unit(view);
+    let pixel = view.pixel_of_far();
     let [along, right, down, constant] = if view.is_parallel {
         [normal.z, -normal.x * pixel, normal.y * pixel, height]
     } else {

@@ -27,12 +27,12 @@ impl Shell {
             longest_span(&scene)?
         };
 
-        let volume = if same_volume && enough_to_leap(before) == enough_to_leap(&scene) && before.casts_shadows() == scene.casts_shadows() {
+        let volume = if same_volume && enough_to_leap(before) == enough_to_leap(&scene) {
             kept.push("the volume is kept on the device: it is the same".to_owned());
             None
         } else {
             self.progress.stage("uploading the volume");
-            Some(DeviceVolume::new(&self.gpu, &scene, enough_to_leap(&scene))?)
+            Some(DeviceVolume::new(&self.gpu, &scene.volume, enough_to_leap(&scene))?)
         };
         let same_directions = match (&before.shading, &scene.shading) {
             (Some(a), Some(b)) => Arc::ptr_eq(&a.directions, &b.directions) && a.model == b.model,
