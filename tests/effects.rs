@@ -411,6 +411,41 @@ fn a_lamp_in_the_fog_and_a_steep_plate_agree_with_the_reference() {
     }
 }
 
+/// Where parts of the shell touch and share no vertices, rays of lights that lie in the plane between them are in one of the two: the
+/// shadow is that of the shell in one piece.
+#[test]
+fn rays_of_lights_between_parts_that_touch_are_not_lost() {
+    let whole = Generator::Plane(Plane { size: 2.0, segments: 2 }).build().unwrap();
+    let mut parted = Mesh { positions: Vec::new(), normals: Vec::new(), ..whole.clone() };
+    let middle =
+        |corners: &[u32; 3]| corners.iter().map(|&corner| whole.positions[corner as usize].x).sum::<f64>();
+    for is_right in [false, true] {
+        let first = parted.positions.len() as u32;
+        parted.positions.extend(&whole.positions);
+        parted.normals.extend(&whole.normals);
+        for (triangle, corners) in whole.triangles.iter().enumerate() {
+            if (middle(corners) > 0.0) == is_right {
+                parted.triangles[triangle] = corners.map(|corner| first + corner);
+            }
+        }
+    }
+    let lit = |mesh: &Mesh| {
+        let mut scene = ring();
+        scene.solids = [].into();
+        let options = ShellOptions { uv_scale: DVec2::splat(3.0), ..ShellOptions::new(0.5) };
+        scene.shell = Arc::new(Shell::build(mesh, &options).unwrap());
+        let shading = scene.shading.as_mut().unwrap();
+        shading.lights = vec![sun(DVec3::Y, 2.0)];
+        // A row of its pixels lies in the plane between the parts.
+        shading.shadow_size = 65;
+        render(&scene).image
+    };
+    let (whole, parted) = (lit(&whole), lit(&parted));
+    let apart = rmse(&whole, &parted);
+    println!("RMSE {apart:e}");
+    assert!(apart < 1e-5, "{apart}");
+}
+
 /// Each pixel shows the nearest solid, lit and with its own texture: a ball of more triangles than 16 bits count, on a floor that
 /// reaches behind the eye.
 #[test]

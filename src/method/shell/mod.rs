@@ -350,7 +350,9 @@ fn check_shadows(rgba: &[[f32; 4]]) -> Result<()> {
         message: format!(
             "{unresolved} pixels are lit through more of the shell than a pixel of a light's picture resolves"
         ),
-        help: Some("make shading.shadow_size larger, or shell.uv_scale smaller".into()),
+        help: Some(
+            "make shading.shadow_size larger or shell.uv_scale smaller, and keep the shell from folding: shell.thickness".into(),
+        ),
     })
 }
 
