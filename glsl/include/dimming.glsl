@@ -1,5 +1,5 @@
-// How the medium dims a light's ray, as the curve of curve.glsl, made front to back. Knots are placed as the opacity grows; once there are
-// too many, every other one is left out.
+// How the medium dims a light's ray: makes the curve of curve.glsl (Lokovic, Veach 2000), front to back. Knots are placed as the opacity
+// grows; once there are too many, every other one is left out.
 
 #include "curve.glsl"
 
@@ -38,8 +38,9 @@ void thin_out() {
 float optical_so_far = 0.0;
 float dimmed_until = 0.0; // the depth after which nothing was
 
-// Places the knots that are reached in a step at depth `from`, before which the optical depth is `before`.
-void place(float from, float step, float before, float optical) {
+// Places the knots that are reached in a step at depth `from`.
+void place(float from, float step, float optical) {
+    float before = optical_so_far;
     float now = before + optical;
     float grown = min(opacity(now), 1.0);
     while (grown >= growth * float(KNOTS)) thin_out();
@@ -53,7 +54,7 @@ void place(float from, float step, float before, float optical) {
 // Goes through a step at depth `from` that has this optical depth.
 void dim(float from, float step, float optical) {
     if (!(optical > 0.0)) return;
-    place(from, step, optical_so_far, optical);
+    place(from, step, optical);
     optical_so_far += optical;
     dimmed_until = from + step;
 }

@@ -1,4 +1,4 @@
-// The ray of a pixel of a light's picture.
+// The ray of a pixel of a light's picture, as src/scene/shadow.rs defines it, and the solid at which it ends.
 
 #ifdef SOLIDS
 #include "blocker.glsl"

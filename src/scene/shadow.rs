@@ -72,9 +72,7 @@ impl LightView {
             }
         }
     }
-}
 
-impl LightView {
     /// Distance of pixel centres in parts of `far`: of parallel rays, else at depth 1.
     pub fn pixel_of_far(&self) -> f64 {
         if self.is_parallel { self.pixel / self.far } else { self.pixel }
