@@ -10,7 +10,7 @@ use std::path::Path;
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::pyramid::coverage::{coverage, texels_per_coarse};
+use super::pyramid::coverage::{VolumeCoverage, texels_of};
 use super::{Volume, ktx2_file, texel_at};
 use crate::{Error, Result};
 
@@ -97,25 +97,20 @@ impl Directions {
 fn halved(finer: &DirectionLevel) -> DirectionLevel {
     let size = finer.size.map(|n| (n / 2).max(1));
     let [width, height] = [finer.size[0] as usize, finer.size[1] as usize];
-    let count = size.into_iter().map(|n| n as usize).product();
-    let covered: f64 = (0..3).map(|axis| texels_per_coarse(finer.size[axis], size[axis])).product();
-    let texel = |index| {
-        let [u, v, w] = texel_at(size, index);
+    let coverage = VolumeCoverage::new(finer.size, size);
+    let texel = |at| {
         let mut sum = [0.0; 4];
-        for (w, weight_w) in coverage(finer.size[2], size[2], w) {
-            for (v, weight_v) in coverage(finer.size[1], size[1], v) {
-                for (u, weight_u) in coverage(finer.size[0], size[0], u) {
-                    let weight = weight_u * weight_v * weight_w / covered;
-                    let texel = finer.texels[(w as usize * height + v as usize) * width + u as usize];
-                    for (sum, value) in sum.iter_mut().zip(texel) {
-                        *sum += weight * f64::from(value);
-                    }
-                }
+        let mut parts = 0.0;
+        for ([u, v, w], part) in coverage.of(at) {
+            let texel = finer.texels[(w as usize * height + v as usize) * width + u as usize];
+            for (sum, value) in sum.iter_mut().zip(texel) {
+                *sum += part * f64::from(value);
             }
+            parts += part;
         }
-        sum.map(|value| value as f32)
+        sum.map(|sum| (sum / parts) as f32)
     };
-    DirectionLevel { size, texels: (0..count).into_par_iter().map(texel).collect() }
+    DirectionLevel { size, texels: texels_of(size, [0.0; 4], texel) }
 }
 
 #[cfg(test)]

@@ -1,40 +1,81 @@
-//! Columns of texels, seen along their axis and merged by the opacity equation: exact, and associative, so that four texels
-//! give one column whether merged at once or two by two.
+//! Columns of texels along an axis, merged by the opacity equation: exact, and associative, so that four texels give one
+//! column whether merged at once or two by two.
 
-use super::coverage::{coverage, texels_per_coarse, volume_of};
+use super::coverage::{Coverage, texels_of};
 use super::medium::Passage;
 use crate::volume::Volume;
 
-/// A direction of sight along an axis of the texture.
-#[derive(Debug, Clone, Copy)]
-pub struct Sight {
-    /// 0, 1 or 2: u, v or w.
-    pub axis: usize,
-    /// Whether the viewer is at the upper end of the axis.
-    pub from_above: bool,
+/// Pieces of columns, looked at from above or, of two sides, from below as well.
+pub struct Columns<const SIDES: usize> {
+    /// Along the axis of the columns, pieces; across, texels.
+    pub size: [u32; 3],
+    axis: usize,
+    pieces: Vec<Piece<SIDES>>,
 }
 
-/// The volume with `coarse` texels along the axis of sight in place of those it has, whose edges there are `edge` opacity
-/// distances long.
-pub fn merged_along(volume: &Volume, sight: Sight, coarse: u32, edge: f64) -> Volume {
-    let fine = volume.size[sight.axis];
-    let mut size = volume.size;
-    size[sight.axis] = coarse;
-    if fine == coarse {
-        return volume.clone();
-    }
-    volume_of(size, volume.quantity, |at| {
-        let taps = coverage(fine, coarse, at[sight.axis]);
-        let passage = |(texel, part): (u32, f64)| {
-            let mut place = at;
-            place[sight.axis] = texel;
+/// A [`Passage`], in less memory.
+#[derive(Clone, Copy)]
+struct Piece<const SIDES: usize> {
+    depth: f64,
+    /// Light for its opacity, seen from each side.
+    straight: [[f32; 3]; SIDES],
+}
+
+impl<const SIDES: usize> Columns<SIDES> {
+    /// The columns of a volume along an axis, in `coarse` pieces each. A texel is `edge` opacity distances long there.
+    pub fn of(volume: &Volume, axis: usize, coarse: u32, edge: f64) -> Self {
+        let through = |place, part: f64| {
             Passage::through(volume.texel(place).map(f64::from), part * edge, volume.quantity)
         };
-        let whole = match sight.from_above {
-            true => taps.rev().map(passage).reduce(Passage::before),
-            false => taps.map(passage).reduce(Passage::before),
-        };
-        let length = edge * texels_per_coarse(fine, coarse);
-        whole.unwrap_or_default().texel(length, volume.quantity)
-    })
+        Self::merged(volume.size, axis, coarse, through)
+    }
+
+    /// The same columns in fewer pieces.
+    pub fn coarser(&self, coarse: u32) -> Self {
+        Self::merged(self.size, self.axis, coarse, |place, part| self.passage(place, part))
+    }
+
+    fn merged(
+        fine: [u32; 3],
+        axis: usize,
+        coarse: u32,
+        through: impl Fn([u32; 3], f64) -> Passage<SIDES> + Sync,
+    ) -> Self {
+        let mut size = fine;
+        size[axis] = coarse;
+        let coverage = Coverage::new(fine[axis], coarse);
+        let nothing = Piece { depth: 0.0, straight: [[0.0; 3]; SIDES] };
+        let pieces = texels_of(size, nothing, |at| {
+            let passages = coverage.of(at[axis]).iter().map(|&(texel, part)| {
+                let mut place = at;
+                place[axis] = texel;
+                through(place, part)
+            });
+            let whole = passages.reduce(Passage::under).unwrap_or(Passage::NOTHING);
+            // Only a glow near the end of f32 would overflow.
+            let stored = |colour: f64| colour.min(f64::from(f32::MAX)) as f32;
+            Piece { depth: whole.depth, straight: whole.straight().map(|colour| colour.map(stored)) }
+        });
+        Self { size, axis, pieces }
+    }
+
+    /// Through what one piece is of, as many times as long as it is.
+    pub fn passage(&self, at: [u32; 3], times: f64) -> Passage<SIDES> {
+        let Piece { depth, straight } = *self.piece(at);
+        if depth == 0.0 {
+            return Passage::NOTHING;
+        }
+        Passage::of(depth * times, straight.map(|colour| colour.map(f64::from)))
+    }
+
+    /// Whether nothing is in a piece.
+    pub fn is_empty(&self, at: [u32; 3]) -> bool {
+        self.piece(at).depth == 0.0
+    }
+
+    fn piece(&self, at: [u32; 3]) -> &Piece<SIDES> {
+        let [u, v, w] = at.map(|i| i as usize);
+        let [width, height] = [self.size[0] as usize, self.size[1] as usize];
+        &self.pieces[(w * height + v) * width + u]
+    }
 }

@@ -11,50 +11,82 @@ pub fn halved(size: [u32; 3]) -> [u32; 3] {
     size.map(|n| (n / 2).max(1))
 }
 
-/// The texels, of `fine` along an axis, that texel `coarse_texel` of `coarse` covers, each with the part, in (0, 1], of it
-/// that is covered.
-pub fn coverage(
-    fine: u32,
-    coarse: u32,
-    coarse_texel: u32,
-) -> impl DoubleEndedIterator<Item = (u32, f64)> + Clone {
-    // In parts of a fine texel, `coarse` of which are one: whole numbers.
-    let [start, end] = [coarse_texel, coarse_texel + 1].map(|edge| u64::from(edge) * u64::from(fine));
-    let part = u64::from(coarse);
-    (start / part..end.div_ceil(part)).map(move |texel| {
-        let covered = end.min((texel + 1) * part) - start.max(texel * part);
-        (texel as u32, covered as f64 / part as f64)
-    })
+/// Which of the texels along an axis each texel of a coarser level covers there.
+pub struct Coverage {
+    /// Of one coarse texel after another: a fine one, and the part of it, in (0, 1], that is covered.
+    taps: Vec<(u32, f64)>,
+    /// Where the taps of each coarse texel begin, and where those of the last end.
+    begins: Vec<usize>,
 }
 
-/// The length of a coarse texel in fine ones: the sum of the weights of its [`coverage`].
+impl Coverage {
+    /// Of `fine` texels by `coarse` ones.
+    pub fn new(fine: u32, coarse: u32) -> Self {
+        // In parts of a fine texel, `coarse` of which are one: whole numbers.
+        let part = u64::from(coarse);
+        let mut taps = Vec::new();
+        let mut begins = vec![0];
+        for texel in 0..coarse {
+            let [start, end] = [texel, texel + 1].map(|edge| u64::from(edge) * u64::from(fine));
+            taps.extend((start / part..end.div_ceil(part)).map(|texel| {
+                let covered = end.min((texel + 1) * part) - start.max(texel * part);
+                (texel as u32, covered as f64 / part as f64)
+            }));
+            begins.push(taps.len());
+        }
+        Self { taps, begins }
+    }
+
+    /// What one coarse texel covers, upwards.
+    pub fn of(&self, coarse_texel: u32) -> &[(u32, f64)] {
+        let texel = coarse_texel as usize;
+        &self.taps[self.begins[texel]..self.begins[texel + 1]]
+    }
+}
+
+/// The length of a coarse texel in fine ones: the sum of the parts that it covers.
 pub fn texels_per_coarse(fine: u32, coarse: u32) -> f64 {
     f64::from(fine) / f64::from(coarse)
 }
 
-/// The texels that a coarse texel covers in the plane of two axes, and the part of each that is covered.
-pub fn covered_area(
-    fine: [u32; 2],
-    coarse: [u32; 2],
-    texel: [u32; 2],
-) -> impl Iterator<Item = ([u32; 2], f64)> + Clone {
-    coverage(fine[1], coarse[1], texel[1]).flat_map(move |(v, weight_v)| {
-        coverage(fine[0], coarse[0], texel[0]).map(move |(u, weight_u)| ([u, v], weight_u * weight_v))
-    })
+/// Which texels of a volume each of a coarser level covers.
+pub struct VolumeCoverage([Coverage; 3]);
+
+impl VolumeCoverage {
+    /// Of a volume of `fine` texels by one of `coarse`.
+    pub fn new(fine: [u32; 3], coarse: [u32; 3]) -> Self {
+        Self([0, 1, 2].map(|axis| Coverage::new(fine[axis], coarse[axis])))
+    }
+
+    /// The texels under one coarse texel, and the part of each that is covered.
+    pub fn of(&self, at: [u32; 3]) -> impl Iterator<Item = ([u32; 3], f64)> + Clone {
+        let [along_u, along_v, along_w] = [0, 1, 2].map(|axis| self.0[axis].of(at[axis]));
+        along_w.iter().flat_map(move |&(w, part_w)| {
+            along_v.iter().flat_map(move |&(v, part_v)| {
+                along_u.iter().map(move |&(u, part_u)| ([u, v, w], part_u * part_v * part_w))
+            })
+        })
+    }
 }
 
 /// A volume whose texels are computed in f64 and independently, so that it does not depend on the threads.
 pub fn volume_of(size: [u32; 3], quantity: Quantity, texel: impl Fn([u32; 3]) -> [f64; 4] + Sync) -> Volume {
+    // Only a glow near the end of f32, gathered from several layers, would overflow.
+    let stored = |at| texel(at).map(|value| value.min(f64::from(f32::MAX)) as f32);
+    Volume { size, texels: texels_of(size, [0.0; 4], stored), quantity }
+}
+
+/// Something for each texel of a volume, computed independently; `filler` is nothing of it.
+pub fn texels_of<T: Copy + Send + Sync>(size: [u32; 3], filler: T, texel: impl Fn([u32; 3]) -> T + Sync) -> Vec<T> {
     let [width, height, depth] = size.map(|n| n as usize);
-    let mut texels = vec![[0.0; 4]; width * height * depth];
+    let mut texels = vec![filler; width * height * depth];
     texels.par_chunks_mut(width).enumerate().for_each(|(row, out)| {
         let (v, w) = ((row % height) as u32, (row / height) as u32);
         for (u, out) in (0..).zip(out) {
-            // Only a glow near the end of f32, gathered from several layers, would overflow.
-            *out = texel([u, v, w]).map(|value| value.min(f64::from(f32::MAX)) as f32);
+            *out = texel([u, v, w]);
         }
     });
-    Volume { size, texels, quantity }
+    texels
 }
 
 #[cfg(test)]
@@ -66,11 +98,12 @@ mod tests {
         for fine in 1..40 {
             for coarse in [1, (fine / 4).max(1), (fine / 2).max(1), fine] {
                 let mut covered = vec![0.0; fine as usize];
+                let coverage = Coverage::new(fine, coarse);
                 for texel in 0..coarse {
-                    let taps: Vec<_> = coverage(fine, coarse, texel).collect();
+                    let taps = coverage.of(texel);
                     let sum: f64 = taps.iter().map(|(_, weight)| weight).sum();
                     assert!((sum - texels_per_coarse(fine, coarse)).abs() < 1e-12);
-                    for (texel, weight) in taps {
+                    for &(texel, weight) in taps {
                         assert!(weight > 0.0 && weight <= 1.0);
                         covered[texel as usize] += weight;
                     }

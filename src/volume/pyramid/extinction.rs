@@ -8,7 +8,7 @@
 //! It is exact for a mist too thin to hide anything. Elsewhere it is too opaque, as `exp` of a mean is below the mean of
 //! `exp` (Jensen): of a wall with a hole in it nothing but the wall is left.
 
-use super::coverage::{coverage, volume_of};
+use super::coverage::{VolumeCoverage, volume_of};
 use super::geometry::Geometry;
 use super::medium::{depth, opacity};
 use crate::volume::{Quantity, Volume};
@@ -24,13 +24,9 @@ pub fn levels(full: &Volume, geometry: &Geometry) -> Vec<Volume> {
 }
 
 fn next(finer: &Volume, size: [u32; 3]) -> Volume {
+    let coverage = VolumeCoverage::new(finer.size, size);
     volume_of(size, finer.quantity, |at| {
-        let axis = |axis: usize| coverage(finer.size[axis], size[axis], at[axis]);
-        let taps = axis(2).flat_map(|w| axis(1).flat_map(move |v| axis(0).map(move |u| [u, v, w])));
-        let taps = taps.map(|taps| {
-            (taps.iter().map(|tap| tap.1).product::<f64>(), finer.texel(taps.map(|tap| tap.0)).map(f64::from))
-        });
-        mean(taps, finer.quantity)
+        mean(coverage.of(at).map(|(place, part)| (part, finer.texel(place).map(f64::from))), finer.quantity)
     })
 }
 

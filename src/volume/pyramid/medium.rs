@@ -10,30 +10,113 @@
 
 use crate::volume::Quantity;
 
-/// What passes through a piece of medium, or comes out of it.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct Passage {
+/// What passes through a piece of medium, or comes out of it, where it is looked at from so many sides.
+#[derive(Debug, Clone, Copy)]
+pub struct Passage<const SIDES: usize = 1> {
     /// Optical depth; infinite behind a wall.
     pub depth: f64,
-    /// Red, green and blue that come out at the viewer's end.
-    pub light: [f64; 3],
+    /// `1 - exp(-depth)`.
+    opacity: f64,
+    /// Red, green and blue that come out: at the lower end, of two sides, and at the upper one.
+    light: [[f64; 3]; SIDES],
 }
 
-impl Passage {
+impl<const SIDES: usize> Passage<SIDES> {
+    /// Through nothing.
+    pub const NOTHING: Self = Self { depth: 0.0, opacity: 0.0, light: [[0.0; 3]; SIDES] };
+
     /// Through a texel over a length.
     pub fn through(texel: [f64; 4], length: f64, quantity: Quantity) -> Self {
         let [red, green, blue, alpha] = texel;
         if alpha == 0.0 {
-            return Self::default();
+            return Self::NOTHING;
         }
-        let depth = depth(alpha, quantity) * length;
-        let emission = match quantity {
-            Quantity::Opacity if length == 1.0 => 1.0,
-            _ => opacity(depth) / alpha,
-        };
-        Self { depth, light: [red, green, blue].map(|colour| colour * emission) }
+        let straight = [red, green, blue].map(|colour| colour / alpha);
+        Self::of(depth(alpha, quantity) * length, [straight; SIDES])
     }
 
+    /// Through what is of one colour, seen from each side, throughout: so deep, and with so much light for its opacity.
+    pub fn of(depth: f64, straight: [[f64; 3]; SIDES]) -> Self {
+        let opacity = opacity(depth);
+        Self { depth, opacity, light: straight.map(|colour| colour.map(|colour| colour * opacity)) }
+    }
+
+    /// Its light for its opacity, seen from each side.
+    pub fn straight(&self) -> [[f64; 3]; SIDES] {
+        let opacity = if self.depth == 0.0 { 1.0 } else { self.opacity };
+        self.light.map(|light| light.map(|light| light / opacity))
+    }
+
+    /// As many times as long.
+    pub fn stretched(self, times: f64) -> Self {
+        Self::of(self.depth * times, self.straight())
+    }
+
+    /// Whether nothing is there.
+    fn is_empty(&self) -> bool {
+        self.depth == 0.0 && self.light == [[0.0; 3]; SIDES]
+    }
+
+    /// This, with another above it.
+    pub fn under(self, above: Self) -> Self {
+        if self.is_empty() {
+            return above;
+        }
+        if above.is_empty() {
+            return self;
+        }
+        let over = |near: &Self, far: &Self, side: usize| {
+            std::array::from_fn(|c| near.light[side][c] + (1.0 - near.opacity) * far.light[side][c])
+        };
+        let from_above = SIDES - 1;
+        let light = std::array::from_fn(|side| match side == from_above {
+            true => over(&above, &self, side),
+            false => over(&self, &above, side),
+        });
+        Self { depth: self.depth + above.depth, opacity: self.opacity + (1.0 - self.opacity) * above.opacity, light }
+    }
+
+    /// The mean transmittance and the mean light of passages side by side, each with its weight.
+    pub fn mean(passages: impl Iterator<Item = (f64, Self)> + Clone) -> Self {
+        // Relative to the thinnest, so that neither 1 - opacity nor a transmittance below 1e-308 is rounded away.
+        let thinnest = passages.clone().map(|(_, passage)| passage);
+        let thinnest = thinnest.reduce(|a, b| if b.depth < a.depth { b } else { a }).unwrap_or(Self::NOTHING);
+        let mut light = [[0.0; 3]; SIDES];
+        let mut beyond = 0.0;
+        let mut weights = 0.0;
+        for (weight, passage) in passages {
+            if passage.depth > thinnest.depth {
+                // What the thinnest lets through is not rounded away up to here, and the quotient needs no exponential.
+                beyond += weight
+                    * match thinnest.opacity < 0.75 {
+                        true => (passage.opacity - thinnest.opacity) / (1.0 - thinnest.opacity),
+                        false => opacity(passage.depth - thinnest.depth),
+                    };
+            }
+            for (sum, light) in light.as_flattened_mut().iter_mut().zip(passage.light.as_flattened()) {
+                *sum += weight * light;
+            }
+            weights += weight;
+        }
+        let beyond = beyond / weights;
+        Self {
+            depth: thinnest.depth + if beyond > 0.0 { optical_depth(beyond) } else { 0.0 },
+            opacity: thinnest.opacity + (1.0 - thinnest.opacity) * beyond,
+            light: light.map(|light| light.map(|light| light / weights)),
+        }
+    }
+}
+
+impl Passage<2> {
+    /// Seen from both sides as much.
+    pub fn from_both(self) -> Passage {
+        let [below, above] = self.light;
+        let light = [std::array::from_fn(|c| 0.5 * (below[c] + above[c]))];
+        Passage { depth: self.depth, opacity: self.opacity, light }
+    }
+}
+
+impl Passage {
     /// The texel that over that length is such a passage.
     pub fn texel(self, length: f64, quantity: Quantity) -> [f64; 4] {
         if self.depth == 0.0 {
@@ -47,45 +130,8 @@ impl Passage {
             return [0.0; 4];
         }
         // Not `E(alpha, length)`: what is so dense that alpha rounds to 1 is no wall yet.
-        let emission = opacity(self.depth) / alpha;
-        let [red, green, blue] = self.light.map(|light| light / emission);
+        let [[red, green, blue]] = self.straight().map(|straight| straight.map(|colour| colour * alpha));
         [red, green, blue, alpha]
-    }
-
-    /// Whether nothing is there.
-    fn is_empty(&self) -> bool {
-        self.depth == 0.0 && self.light == [0.0; 3]
-    }
-
-    /// This, with `behind` behind it.
-    pub fn before(self, behind: Self) -> Self {
-        if self.is_empty() {
-            return behind;
-        }
-        if behind.is_empty() {
-            return self;
-        }
-        let transmittance = (-self.depth).exp();
-        let light = std::array::from_fn(|c| self.light[c] + transmittance * behind.light[c]);
-        Self { depth: self.depth + behind.depth, light }
-    }
-
-    /// The mean transmittance and the mean light of passages side by side, each with its weight.
-    pub fn mean(passages: impl Iterator<Item = (f64, Self)> + Clone) -> Self {
-        // Relative to the thinnest, so that neither 1 - opacity nor a transmittance below 1e-308 is rounded away.
-        let thinnest = passages.clone().map(|(_, passage)| passage.depth).fold(f64::INFINITY, f64::min);
-        let mut sum = [0.0; 4];
-        let mut weights = 0.0;
-        for (weight, Self { depth, light: [red, green, blue] }) in passages {
-            let opacity = if depth > thinnest { opacity(depth - thinnest) } else { 0.0 };
-            for (sum, value) in sum.iter_mut().zip([red, green, blue, opacity]) {
-                *sum += weight * value;
-            }
-            weights += weight;
-        }
-        let [red, green, blue, opacity] = sum.map(|sum| sum / weights);
-        let beyond = if opacity > 0.0 { optical_depth(opacity) } else { 0.0 };
-        Self { depth: thinnest + beyond, light: [red, green, blue] }
     }
 }
 
@@ -114,8 +160,8 @@ mod tests {
     #[test]
     fn the_mean_of_transmittances_keeps_its_accuracy_at_both_ends() {
         let mean = |depths: &[f64]| {
-            let passages = depths.iter().map(|&depth| (0.5, Passage { depth, light: [0.0; 3] }));
-            Passage::mean(passages).depth
+            let passages = depths.iter().map(|&depth| (0.5, Passage::of(depth, [[0.0; 3]])));
+            Passage::<1>::mean(passages).depth
         };
         for depth in [0.0, 1e-300, 1e-9, 1.0, 1e5, f64::INFINITY] {
             assert_eq!(mean(&[depth, depth]), depth);
@@ -131,7 +177,7 @@ mod tests {
         for quantity in [Quantity::Opacity, Quantity::Extinction] {
             for texel in [[0.1, 0.2, 0.3, 0.4], [3.0, 0.0, 0.5, 1.0], [1e-7, 0.0, 0.0, 1e-9], [0.0; 4]] {
                 for length in [0.01, 1.0, 40.0] {
-                    let back = Passage::through(texel, length, quantity).texel(length, quantity);
+                    let back = Passage::<1>::through(texel, length, quantity).texel(length, quantity);
                     // An opacity near 1 - exp(-40 / 2) is rounded by 1e-16 of exp(20): of no matter in f32.
                     let near = |(a, b): (&f64, &f64)| (a - b).abs() <= 1e-12 * b.abs();
                     assert!(back.iter().zip(&texel).all(near), "{texel:?} over {length}: {back:?}");
@@ -141,11 +187,21 @@ mod tests {
     }
 
     #[test]
-    fn one_passage_before_another_hides_it() {
-        let through = |texel| Passage::through(texel, 1.0, Quantity::Opacity);
-        let (veil, wall) = (through([0.0, 0.25, 0.0, 0.25]), through([1.0, 0.0, 0.0, 1.0]));
-        assert_eq!(veil.before(wall).light, [0.75, 0.25, 0.0]);
-        assert_eq!(wall.before(veil).light, [1.0, 0.0, 0.0]);
-        assert_eq!(wall.before(veil).depth, f64::INFINITY);
+    fn one_passage_hides_another_from_its_own_side() {
+        fn stacks<const SIDES: usize>() -> [[[f64; 3]; SIDES]; 2] {
+            let through = |texel| Passage::<SIDES>::through(texel, 1.0, Quantity::Opacity);
+            let (veil, wall) = (through([0.0, 0.5, 0.0, 0.5]), through([1.0, 0.0, 0.0, 1.0]));
+            assert_eq!(veil.under(wall).depth, f64::INFINITY);
+            [wall.under(veil), veil.under(wall)].map(|stack| stack.light)
+        }
+        let (wall, both) = ([1.0, 0.0, 0.0], [0.5, 0.5, 0.0]);
+        assert_eq!(stacks::<2>(), [[wall, both], [both, wall]]);
+        assert_eq!(stacks::<1>(), [[both], [wall]]);
+    }
+
+    #[test]
+    fn from_both_sides_is_the_mean_of_each() {
+        let both = Passage { depth: 1.0, opacity: opacity(1.0), light: [[0.5, 0.0, 1.0], [0.25, 0.0, 0.0]] }.from_both();
+        assert_eq!((both.depth, both.light), (1.0, [[0.375, 0.0, 0.5]]));
     }
 }

@@ -13,8 +13,8 @@
 //! Across u and v it averages opacities of *one opacity distance*. A texel that is many of them thick lets through less than
 //! that: half of it filled with a wall has an alpha of 1/2, and stops all but `2^-t` of the light, not half of it.
 
-use super::column::{Sight, merged_along};
-use super::coverage::{coverage, texels_per_coarse, volume_of};
+use super::column::Columns;
+use super::coverage::{Coverage, texels_per_coarse, volume_of};
 use super::geometry::Geometry;
 use crate::volume::Volume;
 
@@ -30,22 +30,25 @@ pub fn levels(full: &Volume, geometry: &Geometry) -> Vec<Volume> {
 
 /// The level of `size` after `finer`, whose layers are `thickness` opacity distances thick.
 fn next(finer: &Volume, size: [u32; 3], thickness: f64) -> Volume {
-    let columns = merged_along(finer, Sight { axis: 2, from_above: true }, size[2], thickness);
+    let columns = Columns::<1>::of(finer, 2, size[2], thickness);
+    let length = thickness * texels_per_coarse(finer.size[2], size[2]);
+    let columns = volume_of(columns.size, finer.quantity, |at| columns.passage(at, 1.0).texel(length, finer.quantity));
     across(&columns, size)
 }
 
 /// The mean of the texels that each covers, as they are.
 fn across(columns: &Volume, size: [u32; 3]) -> Volume {
+    let [along_u, along_v] = [0, 1].map(|axis| Coverage::new(columns.size[axis], size[axis]));
+    let area = texels_per_coarse(columns.size[0], size[0]) * texels_per_coarse(columns.size[1], size[1]);
     volume_of(size, columns.quantity, |[x, y, z]| {
         let mut sum = [0.0; 4];
-        for (v, weight_v) in coverage(columns.size[1], size[1], y) {
-            for (u, weight_u) in coverage(columns.size[0], size[0], x) {
+        for &(v, part_v) in along_v.of(y) {
+            for &(u, part_u) in along_u.of(x) {
                 for (sum, value) in sum.iter_mut().zip(columns.texel([u, v, z])) {
-                    *sum += weight_u * weight_v * f64::from(value);
+                    *sum += part_u * part_v * f64::from(value);
                 }
             }
         }
-        let area = texels_per_coarse(columns.size[0], size[0]) * texels_per_coarse(columns.size[1], size[1]);
         sum.map(|sum| sum / area)
     })
 }

@@ -8,7 +8,7 @@
 //! It knows no direction, and takes what lies in line for longer than it is: half a wall lets half of the light through,
 //! across it as well as along it. Levels are made from level 0, not from one another.
 
-use super::coverage::{coverage, volume_of};
+use super::coverage::{VolumeCoverage, volume_of};
 use super::geometry::Geometry;
 use super::medium::Passage;
 use crate::volume::Volume;
@@ -20,13 +20,10 @@ pub fn levels(full: &Volume, geometry: &Geometry) -> Vec<Volume> {
 }
 
 fn merged(full: &Volume, size: [u32; 3], length: f64) -> Volume {
+    let coverage = VolumeCoverage::new(full.size, size);
     volume_of(size, full.quantity, |at| {
-        let axis = |axis: usize| coverage(full.size[axis], size[axis], at[axis]);
-        let taps = axis(2).flat_map(|w| axis(1).flat_map(move |v| axis(0).map(move |u| [u, v, w])));
-        let passages = taps.map(|taps| {
-            let texel = full.texel(taps.map(|tap| tap.0)).map(f64::from);
-            let weight = taps.iter().map(|tap| tap.1).product();
-            (weight, Passage::through(texel, length, full.quantity))
+        let passages = coverage.of(at).map(|(place, part)| {
+            (part, Passage::through(full.texel(place).map(f64::from), length, full.quantity))
         });
         Passage::mean(passages).texel(length, full.quantity)
     })

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::coverage::{coverage, texels_per_coarse};
+use super::coverage::{Coverage, texels_of, texels_per_coarse};
 use super::medium::depth;
 use crate::volume::Volume;
 
@@ -46,18 +46,16 @@ impl Visibility {
         let fine = self.size[axis];
         let mut size = self.size;
         size[axis] = coarse;
-        let [width, height] = [size[0] as usize, size[1] as usize];
-        let mean = |index: usize| {
-            let at = [index % width, index / width % height, index / width / height].map(|i| i as u32);
-            let parts = coverage(fine, coarse, at[axis]).map(|(texel, part)| {
+        let coverage = Coverage::new(fine, coarse);
+        let mean = |at: [u32; 3]| {
+            let parts = coverage.of(at[axis]).iter().map(|&(texel, part)| {
                 let mut place = at;
                 place[axis] = texel;
                 part * self.at(place)
             });
             (parts.sum::<f64>() / texels_per_coarse(fine, coarse)) as f32
         };
-        let count = width * height * size[2] as usize;
-        Self { size, parts: (0..count).into_par_iter().map(mean).collect() }
+        Self { size, parts: texels_of(size, 0.0, mean) }
     }
 }
 

@@ -38,6 +38,44 @@ fn wrap(cell: IVec3, period: [i32; 2]) -> IVec3 {
     IVec3::new(cell.x.rem_euclid(period[0]), cell.y.rem_euclid(period[1]), cell.z)
 }
 
+/// The 12 edges of a cube; four of them twice, so that four bits choose one without a bias in z.
+const GRADIENTS: [[f32; 3]; 16] = [
+    [1., 1., 0.],
+    [-1., 1., 0.],
+    [1., -1., 0.],
+    [-1., -1., 0.],
+    [1., 0., 1.],
+    [-1., 0., 1.],
+    [1., 0., -1.],
+    [-1., 0., -1.],
+    [0., 1., 1.],
+    [0., -1., 1.],
+    [0., 1., -1.],
+    [0., -1., -1.],
+    [1., 1., 0.],
+    [-1., 1., 0.],
+    [0., -1., 1.],
+    [0., -1., -1.],
+];
+
+/// [`GRADIENTS`] after a quarter turn, each in its own plane. From a table, as a processor does not foresee which plane it is.
+const QUARTER_TURNS: [[f32; 3]; 16] = {
+    let mut turns = GRADIENTS;
+    let mut edge = 0;
+    while edge < turns.len() {
+        let [a, b, c] = GRADIENTS[edge];
+        turns[edge] = if c == 0. {
+            [-b, a, 0.]
+        } else if b == 0. {
+            [-c, 0., a]
+        } else {
+            [0., -c, b]
+        };
+        edge += 1;
+    }
+    turns
+};
+
 /// Gradient noise at a point in lattice units, where a tile has `period` cells along x and y (each at
 /// least 1). Smooth (C2), 0 at lattice points, within +-1.04.
 pub(super) fn gradient(point: Vec3, period: [u32; 2], seed: u32) -> f32 {
@@ -53,25 +91,6 @@ pub(super) fn turned(phase: f32) -> Vec2 {
 /// The same whose gradients have [`turned`], each in its own plane: noise that swirls in place, and comes back to itself (Ken Perlin,
 /// Fabrice Neyret, "Flow Noise", SIGGRAPH 2001).
 pub(super) fn flowing(point: Vec3, period: [u32; 2], seed: u32, turned: Vec2) -> f32 {
-    // The 12 edges of a cube; four of them twice, so that four bits choose one without a bias in z.
-    const GRADIENTS: [[f32; 3]; 16] = [
-        [1., 1., 0.],
-        [-1., 1., 0.],
-        [1., -1., 0.],
-        [-1., -1., 0.],
-        [1., 0., 1.],
-        [-1., 0., 1.],
-        [1., 0., -1.],
-        [-1., 0., -1.],
-        [0., 1., 1.],
-        [0., -1., 1.],
-        [0., 1., -1.],
-        [0., -1., -1.],
-        [1., 1., 0.],
-        [-1., 1., 0.],
-        [0., -1., 1.],
-        [0., -1., -1.],
-    ];
     let floor = point.floor();
     let (cell, within) = (floor.as_ivec3(), point - floor);
     let period = period.map(|cells| cells as i32);
@@ -79,17 +98,8 @@ pub(super) fn flowing(point: Vec3, period: [u32; 2], seed: u32, turned: Vec2) ->
     let far = wrap(cell + IVec3::new(1, 1, 0), period) + IVec3::Z;
     let corner = |x: i32, y: i32, z: i32| {
         let lattice = IVec3::new([near.x, far.x][x as usize], [near.y, far.y][y as usize], near.z + z);
-        let gradient = Vec3::from(GRADIENTS[(hash(lattice, seed) & 15) as usize]);
-        // A quarter turn of (a, b) in the two axes that the gradient has is (-b, a).
-        let [a, b, c] = gradient.to_array();
-        let quarter = if c == 0. {
-            Vec3::new(-b, a, 0.)
-        } else if b == 0. {
-            Vec3::new(-c, 0., a)
-        } else {
-            Vec3::new(0., -c, b)
-        };
-        let slope = turned.x * gradient + turned.y * quarter;
+        let edge = (hash(lattice, seed) & 15) as usize;
+        let slope = turned.x * Vec3::from(GRADIENTS[edge]) + turned.y * Vec3::from(QUARTER_TURNS[edge]);
         slope.dot(within - IVec3::new(x, y, z).as_vec3())
     };
     let fade = within * within * within * (within * (within * 6. - 15.) + 10.);
