@@ -15,6 +15,10 @@ const float LEAST = 1e-30;
 #define radiant fetch // unlit, a texel's colour is what it sends out
 #endif
 
+#if defined(LIT) && defined(SPARSE)
+#define LIT_SPARSE
+#endif
+
 // Passes through loops that one costs: its own, and one for each light that is not unrolled.
 #ifdef LIT
 const uint PASSES_A_SAMPLE = LIGHTS > UNROLLED ? 1 + LIGHTS - UNROLLED : 1;
@@ -27,14 +31,39 @@ vec3 emitted(vec4 texel, float amount) {
     return texel.a > LEAST ? texel.rgb * (amount / texel.a) : vec3(0.0);
 }
 
+#ifdef LIT_SPARSE
+// On from sample `i` to one in which something is, at depth `z`, or to the last: to light a texel costs several times what it costs to
+// read one, and of eight pixels that run at once each finds its own before all are lit.
+vec4 find(Path path, Steps steps, inout uint i, out float z, inout uint passes) {
+    vec4 texel = vec4(0.0);
+    z = 0.0;
+    // It has two ends: see `march_midpoints`.
+    for (; i < steps.count;) {
+        z = middle(steps, i);
+        texel = fetch(path, z);
+        if (texel.a > LEAST) break;
+        passes++;
+        i = seek(path, steps, i + 1, passes);
+        if (i >= steps.count) break;
+    }
+    return texel;
+}
+#endif
+
 // Midpoint rule over the steps from number `i` on: the texture is constant over a step, and the exponential is exact. Counts passes
 // through loops.
 void march_midpoints(Path path, Steps steps, uint i, float per_depth, inout Light light, inout uint passes) {
     // Where several pixels run at once, a test at the end costs no pass that nobody needs; but a loop whose only end that is lavapipe
     // 22.3 gets wrong: what a pixel that is done has summed is summed again, in part, as the others go on. So it has another at the top.
     for (; i < steps.count;) {
+#ifdef LIT_SPARSE
+        float z;
+        vec4 texel = find(path, steps, i, z, passes);
+        texel = lit(texel, path, z);
+#else
         float z = middle(steps, i);
         vec4 texel = radiant(path, z);
+#endif
         float optical = extinction(texel) * max(steps.size * per_depth, LEAST);
         float alpha = opacity(optical);
         light.depth += transmittance(light.gathered) * alpha * z;

@@ -54,9 +54,8 @@ void add_light(uint light_index, Spot spot, inout vec3 scattered, inout vec3 mir
     mirrored += light * (lighting.specular * spot.agreement * lobe);
 }
 
-// The texel as it is lit: its alpha, and the colour that it sends to the eye, premultiplied as before.
-vec4 radiant(Path path, float depth) {
-    vec4 texel = fetch(path, depth);
+// A texel as it is lit: its alpha, and the colour that it sends to the eye, premultiplied as before.
+vec4 lit(vec4 texel, Path path, float depth) {
     if (!(texel.a > LEAST)) return texel;
     vec4 weighted = fetch_direction(path, depth);
     vec3 direction = (frame_at_eye + depth * frame_from_depth) * weighted.xyz;
@@ -81,4 +80,9 @@ vec4 radiant(Path path, float depth) {
         scattered += lighting.glow * clamp((brightest - lighting.glow_from) / (1.0 - lighting.glow_from), 0.0, 1.0);
     }
     return vec4(texel.rgb * scattered + texel.a * mirrored, texel.a);
+}
+
+// As `fetch`, lit.
+vec4 radiant(Path path, float depth) {
+    return lit(fetch(path, depth), path, depth);
 }

@@ -158,6 +158,11 @@ impl Gpu {
         1 << self.limits.sub_pixel_precision_bits
     }
 
+    /// How many texels a buffer of texels holds: 65,536 at least.
+    pub fn most_texels(&self) -> usize {
+        self.limits.max_texel_buffer_elements as usize
+    }
+
     /// Refuses a picture or a volume that the device could not hold, of so many pixels or texels a side. What is asked here is
     /// asked again when they are made; this is for asking before the volume is computed.
     ///

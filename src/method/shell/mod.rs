@@ -180,13 +180,16 @@ impl Method for Shell {
             }
             last => {
                 spare = last.and_then(|last| last.seen);
-                let sight = match walks {
-                    true => {
-                        self.progress.stage("finding where rays enter");
-                        let ways = ways(&mut self.ways, &self.scene.shell);
-                        Sight::Walked(Crossings::new(ways.faces(), &self.scene.shell, view))
+                let crossings = walks.then(|| {
+                    self.progress.stage("finding where rays enter");
+                    let ways = ways(&mut self.ways, &self.scene.shell);
+                    Crossings::new(ways.faces(), &self.scene.shell, view)
+                });
+                let sight = match crossings {
+                    Some(crossings) if walk::holds(&self.gpu, &self.scene.shell, &crossings) => {
+                        Sight::Walked(crossings)
                     }
-                    false => {
+                    _ => {
                         self.progress.stage("sorting the tetrahedra");
                         Sight::Sorted(
                             sorter(&mut self.sorter, &self.scene.shell).sort(&self.scene.shell, view),
@@ -223,8 +226,11 @@ impl Method for Shell {
         };
         let keeps_shadows = self.shadows.is_some();
         let needs_shadows = self.scene.casts_shadows() && !keeps_shadows;
-        if walks || needs_shadows {
-            ways(&mut self.ways, &self.scene.shell).place(&self.gpu, &self.scene.shell)?;
+        if matches!(sight, Sight::Walked(_)) || needs_shadows {
+            let ways = ways(&mut self.ways, &self.scene.shell);
+            if walk::holds_cells(&self.gpu, &self.scene.shell) {
+                ways.place(&self.gpu, &self.scene.shell)?;
+            }
         }
         if needs_shadows {
             self.progress.stage("drawing shadows");

@@ -2,7 +2,7 @@
 
 use super::Shell;
 use super::constants::wanted_samples;
-use super::walk::MOST_SAMPLES;
+use super::walk::{MOST_SAMPLES, holds_cells};
 use crate::method::Choice;
 use crate::scene::{March, Scene, Skip, Traversal};
 
@@ -19,11 +19,12 @@ pub(super) fn enough_to_leap(scene: &Scene) -> Option<f64> {
 }
 
 impl Shell {
-    /// Whether rays walk; else tetrahedra are sorted.
+    /// Whether rays walk, where the device has room for the view; else tetrahedra are sorted.
     pub(super) fn walks(&self) -> bool {
         self.scene.traversal == Traversal::Walk
             && matches!(self.scene.march, March::Default { .. })
             && wanted_samples(self.scene.march, self.texels) <= MOST_SAMPLES
+            && holds_cells(&self.gpu, &self.scene.shell)
     }
 
     /// Whether rays leap over what is empty.
@@ -40,6 +41,11 @@ impl Shell {
             ("walk", "each ray goes by itself from neighbour to neighbour: nothing need be sorted".to_owned())
         } else if self.scene.traversal == Traversal::Sort {
             ("sort", "march.traversal asks for it".to_owned())
+        } else if !holds_cells(&self.gpu, &self.scene.shell) {
+            (
+                "sort",
+                "the device's buffers are too small for rays to walk through so many tetrahedra".to_owned(),
+            )
         } else if let March::Default { .. } = self.scene.march {
             let wanted = wanted_samples(self.scene.march, self.texels);
             ("sort", format!("a ray may take {wanted:.0} samples in one tetrahedron: too many to walk"))

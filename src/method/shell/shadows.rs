@@ -14,7 +14,7 @@ use glam::DVec3;
 use super::constants::{ViewConstants, constants_of_volume};
 use super::lens::{NEAR, PictureFrame, SeenByLight};
 use super::volume::DeviceVolume;
-use super::walk::{RayBuffers, Ways};
+use super::walk::{self, RayBuffers, Ways};
 use crate::Result;
 use crate::gpu::{Batch, Buffer, Draw, Gpu, Keeps, Pipeline, PipelineInfo, Sampled, Target, draw, shaders};
 use crate::order::Crossings;
@@ -78,8 +78,8 @@ struct CurvePipelines {
 }
 
 impl Shadows {
-    /// Draws the pictures of all lights that cast shadows, of which there is at least one. `ways` are placed, of the scene's shell; where `leaps`,
-    /// rays do, over what is empty.
+    /// Draws the pictures of all lights that cast shadows, of which there is at least one. `ways` are of the scene's shell, and placed
+    /// where the device holds its tetrahedra; where `leaps`, rays do, over what is empty.
     ///
     /// # Errors
     /// [`Error::Device`](crate::Error::Device) where the pictures are too large for the device,
@@ -248,29 +248,34 @@ impl Shadows {
             if pipelines.is_none() {
                 *pipelines = Some(self.curve_pipelines(gpu, scene, leaps, minified)?);
             }
-            let CurvePipelines { walk, left } = pipelines.as_ref().expect("made just now");
-            let cells = Buffer::floats(gpu, "a light's tetrahedra", &seen.cells)?;
+            let CurvePipelines { walk: walking, left } = pipelines.as_ref().expect("made just now");
             let cells_of_left =
                 Buffer::storage(gpu, "a light's tetrahedra, for rays that are left", &seen.cells)?;
             let tiles = Buffer::storage(gpu, "a light's tiles", &seen.tiles)?;
             let members = Buffer::storage(gpu, "the members of a light's tiles", &seen.members)?;
-            let rays = RayBuffers::new(gpu, &crossings)
-                .map_err(|error| error.with_help("make shading.shadow_size smaller"))?;
-            let mut buffers =
-                vec![(0, &cells_of_left), (1, &tiles), (2, &members), (6, &pictures), (18, &cells)];
-            buffers.push((19, ways.beyond()));
-            buffers.extend(rays.buffers());
+            let mut buffers = vec![(0, &cells_of_left), (1, &tiles), (2, &members), (6, &pictures)];
             let vertices = 0..6 * seen.tiles.len() as u32;
+            let mut batches = vec![Batch { pipeline: left, vertices: vertices.clone() }];
+            // Where the device has no room for that, no ray walks, and all are left.
+            let walked = match walk::holds(gpu, &scene.shell, &crossings) {
+                true => {
+                    let cells = Buffer::floats(gpu, "a light's tetrahedra", &seen.cells)?;
+                    Some((cells, RayBuffers::new(gpu, &crossings)?))
+                }
+                false => None,
+            };
+            if let Some((cells, rays)) = &walked {
+                buffers.extend([(18, cells), (19, ways.beyond())]);
+                buffers.extend(rays.buffers());
+                batches.insert(0, Batch { pipeline: walking, vertices });
+            }
             draw(&Draw {
                 target: &self.curves,
                 clears: index == 0,
                 buffers: &buffers,
                 textures: &textures,
                 push_constants: bytemuck::bytes_of(&constants),
-                batches: &[
-                    Batch { pipeline: walk, vertices: vertices.clone() },
-                    Batch { pipeline: left, vertices },
-                ],
+                batches: &batches,
                 between: &|done| between((index as f64 + done) / self.views.len() as f64),
             })?;
         }

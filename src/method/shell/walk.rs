@@ -15,6 +15,19 @@ pub const MOST_SAMPLES: f64 = 500.0;
 /// A ray ends where less is let through: that changes no picture by 1e-6.
 pub const SATURATED: f32 = 1.0 / (1 << 20) as f32;
 
+/// Of `cells` of `glsl/include/walk.glsl`, a tetrahedron.
+const CELL_TEXELS: usize = 9;
+
+/// Whether the device's buffers of texels hold a shell for rays to walk through.
+pub fn holds_cells(gpu: &Gpu, shell: &Shell) -> bool {
+    CELL_TEXELS * shell.topology.tetrahedra.len() <= gpu.most_texels()
+}
+
+/// Whether they hold where rays cross its boundary, too.
+pub fn holds(gpu: &Gpu, shell: &Shell, crossings: &Crossings) -> bool {
+    holds_cells(gpu, shell) && crossings.of_pixels.len().max(crossings.places.len()) <= gpu.most_texels()
+}
+
 /// A shell's faces.
 pub struct Ways {
     topology: Arc<Topology>,

@@ -77,7 +77,11 @@ pub fn volume_of(size: [u32; 3], quantity: Quantity, texel: impl Fn([u32; 3]) ->
 }
 
 /// Something for each texel of a volume, computed independently; `filler` is nothing of it.
-pub fn texels_of<T: Copy + Send + Sync>(size: [u32; 3], filler: T, texel: impl Fn([u32; 3]) -> T + Sync) -> Vec<T> {
+pub fn texels_of<T: Copy + Send + Sync>(
+    size: [u32; 3],
+    filler: T,
+    texel: impl Fn([u32; 3]) -> T + Sync,
+) -> Vec<T> {
     let [width, height, depth] = size.map(|n| n as usize);
     let mut texels = vec![filler; width * height * depth];
     texels.par_chunks_mut(width).enumerate().for_each(|(row, out)| {

@@ -18,7 +18,6 @@
 //! - A ray that runs sideways stays in one layer for longer than one texel, and layers differ more than what lies side by
 //!   side in one. So transmittances of layers average at [`REACH`] times the texel's length.
 
-
 use super::column::Columns;
 use super::coverage::{Coverage, texels_of, volume_of};
 use super::geometry::Geometry;

@@ -73,7 +73,11 @@ impl<const SIDES: usize> Passage<SIDES> {
             true => over(&above, &self, side),
             false => over(&self, &above, side),
         });
-        Self { depth: self.depth + above.depth, opacity: self.opacity + (1.0 - self.opacity) * above.opacity, light }
+        Self {
+            depth: self.depth + above.depth,
+            opacity: self.opacity + (1.0 - self.opacity) * above.opacity,
+            light,
+        }
     }
 
     /// The mean transmittance and the mean light of passages side by side, each with its weight.
@@ -201,7 +205,8 @@ mod tests {
 
     #[test]
     fn from_both_sides_is_the_mean_of_each() {
-        let both = Passage { depth: 1.0, opacity: opacity(1.0), light: [[0.5, 0.0, 1.0], [0.25, 0.0, 0.0]] }.from_both();
+        let both = Passage { depth: 1.0, opacity: opacity(1.0), light: [[0.5, 0.0, 1.0], [0.25, 0.0, 0.0]] }
+            .from_both();
         assert_eq!((both.depth, both.light), (1.0, [[0.375, 0.0, 0.5]]));
     }
 }

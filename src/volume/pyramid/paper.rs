@@ -32,7 +32,8 @@ pub fn levels(full: &Volume, geometry: &Geometry) -> Vec<Volume> {
 fn next(finer: &Volume, size: [u32; 3], thickness: f64) -> Volume {
     let columns = Columns::<1>::of(finer, 2, size[2], thickness);
     let length = thickness * texels_per_coarse(finer.size[2], size[2]);
-    let columns = volume_of(columns.size, finer.quantity, |at| columns.passage(at, 1.0).texel(length, finer.quantity));
+    let columns =
+        volume_of(columns.size, finer.quantity, |at| columns.passage(at, 1.0).texel(length, finer.quantity));
     across(&columns, size)
 }
 
