@@ -301,11 +301,23 @@ impl ABuffer {
         Self { raster, footprints, bands }
     }
 
-    /// What `visit` makes of each band, from the top of the picture down; each thread that works on some has a state of its own.
-    pub(super) fn map_bands<S, T: Send>(
+    /// Pixels of a band, of all but the last, and how many bands there are.
+    pub(super) fn bands(&self) -> (usize, usize) {
+        (BAND * self.raster.width, self.bands.len())
+    }
+
+    /// Pixels of the picture.
+    pub(super) fn pixels(&self) -> usize {
+        self.raster.width * self.raster.height
+    }
+
+    /// What `visit` makes of each band, from the top of the picture down, and of its part of something; each thread that works on
+    /// some has a state of its own.
+    pub(super) fn map_bands<S, P: Send, T: Send>(
         &self,
+        parts: Vec<P>,
         state: impl Fn() -> S + Sync + Send,
-        visit: impl Fn(&mut S, &mut Band) -> T + Sync + Send,
+        visit: impl Fn(&mut S, &mut Band, P) -> T + Sync + Send,
     ) -> Vec<T> {
         let band = || Band {
             raster: self.raster,
@@ -316,12 +328,13 @@ impl ABuffer {
         };
         self.bands
             .par_iter()
+            .zip(parts)
             .enumerate()
             .map_init(
                 || (state(), band()),
-                |(state, band), (number, members)| {
+                |(state, band), (number, (members, part))| {
                     band.collect_spans(number, members, &self.footprints);
-                    visit(state, band)
+                    visit(state, band, part)
                 },
             )
             .collect()

@@ -35,11 +35,11 @@ pub struct Crossings {
 }
 
 impl Crossings {
-    /// Of the pixel centres of `view`; `faces` are those of the shell's topology. Depends on nothing else, the number of threads
-    /// included.
-    pub fn new(faces: &FaceTable, shell: &Shell, view: &View) -> Self {
+    /// Of the pixel centres of `view`, in the memory of `spare`; `faces` are those of the shell's topology. Depends on nothing else,
+    /// the number of threads included.
+    pub fn new(faces: &FaceTable, shell: &Shell, view: &View, spare: Option<Self>) -> Self {
         let boundary = faces.boundary(&shell.determinants, &shell.vertices, view.camera.eye);
-        Self::of(&ABuffer::of_view(&shell.vertices, &boundary, view))
+        Self::of(&ABuffer::of_view(&shell.vertices, &boundary, view), spare.unwrap_or_default())
     }
 
     /// The same of the picture of a light, `side` pixels a side. Parallel rays are those of an eye that a projective map has brought in
@@ -57,36 +57,55 @@ impl Crossings {
         let vertices: Vec<DVec3> = shell.vertices.par_iter().with_min_len(1024).map(from_light).collect();
         let boundary = faces.boundary(&shell.determinants, &vertices, DVec3::ZERO);
         let raster = Raster { width: side as usize, height: side as usize, pixel: light.pixel_of_far() };
-        Self::of(&ABuffer::new(&vertices, &boundary, raster))
+        Self::of(&ABuffer::new(&vertices, &boundary, raster), Self::default())
     }
 
-    fn of(abuffer: &ABuffer) -> Self {
+    fn of(abuffer: &ABuffer, spare: Self) -> Self {
+        let Self { mut of_pixels, mut places, .. } = spare;
+        of_pixels.resize(abuffer.pixels(), [0; 2]);
+        places.clear();
+        let (pixels, _) = abuffer.bands();
         let bands = abuffer.map_bands(
+            of_pixels.chunks_mut(pixels).collect(),
             || (),
-            |(), band| {
-                let mut found = Self::default();
+            |(), band, of_pixels| {
+                let mut found = BandCrossings { of_pixels, ..BandCrossings::default() };
                 band.each_run(|pixels, crossings| found.add(pixels, crossings));
                 found
             },
         );
-        let mut all = Self::default();
-        all.of_pixels.reserve_exact(bands.iter().map(|band| band.of_pixels.len()).sum());
+        let sum = |of: fn(&BandCrossings<'_>) -> u64| bands.iter().map(of).sum();
+        let [count, begun_inside, overlapping] =
+            [sum(|band| band.count), sum(|band| band.begun_inside), sum(|band| band.overlapping)];
+        let mut before = Vec::with_capacity(bands.len());
         for band in bands {
-            let before = all.places.len() as u32;
-            all.of_pixels.extend(band.of_pixels.iter().map(|range| range.map(|place| before + place)));
-            all.places.extend(band.places);
-            all.count += band.count;
-            all.begun_inside += band.begun_inside;
-            all.overlapping += band.overlapping;
+            before.push(places.len() as u32);
+            places.extend(band.places);
         }
-        all
+        let ranges = of_pixels.par_chunks_mut(pixels).zip(before);
+        ranges
+            .for_each(|(ranges, before)| ranges.as_flattened_mut().iter_mut().for_each(|end| *end += before));
+        Self { of_pixels, places, count, begun_inside, overlapping }
     }
 
     /// Whether a pixel's ray crosses the boundary, by its range.
     pub fn are_some([first, last]: &[u32; 2]) -> bool {
         first & !(BEGUN | INTRICATE) < *last
     }
+}
 
+/// What is found in one band of rows.
+#[derive(Default)]
+struct BandCrossings<'a> {
+    /// Of the pixels that are not done; `places` count from the band's first.
+    of_pixels: &'a mut [[u32; 2]],
+    places: Vec<u32>,
+    count: u64,
+    begun_inside: u64,
+    overlapping: u64,
+}
+
+impl BandCrossings<'_> {
     /// Adds pixels beside one another whose rays cross the same.
     fn add(&mut self, pixels: usize, crossings: &[Crossing]) {
         let leaves = crossings.iter().filter(|crossing| crossing.leaves()).count();
@@ -101,7 +120,9 @@ impl Crossings {
         }
         let flags = if begins_inside { BEGUN } else { 0 } | if overlaps { INTRICATE } else { 0 };
         let range = [first | flags, self.places.len() as u32];
-        self.of_pixels.extend(std::iter::repeat_n(range, pixels));
+        let (these, others) = std::mem::take(&mut self.of_pixels).split_at_mut(pixels);
+        these.fill(range);
+        self.of_pixels = others;
         let pixels = pixels as u64;
         self.count += pixels * crossings.len() as u64;
         self.begun_inside += if begins_inside { pixels } else { 0 };

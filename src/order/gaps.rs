@@ -29,9 +29,11 @@ struct Scratch {
 /// Relates tetrahedra across gaps: lists of `[front, back]`, with duplicates. `tetrahedra` is the number of all. The set of pairs
 /// does not depend on threads.
 pub(super) fn relate(abuffer: &ABuffer, tetrahedra: usize) -> Vec<Vec<[u32; 2]>> {
+    let (_, bands) = abuffer.bands();
     abuffer.map_bands(
+        vec![(); bands],
         || Scratch::new(tetrahedra),
-        |scratch, band| {
+        |scratch, band, ()| {
             let mut pairs = Vec::new();
             band.each_run(|_, crossings| scratch.follow_ray(crossings, &mut pairs));
             pairs

@@ -88,6 +88,15 @@ enum Sight {
     Walked(Crossings),
 }
 
+impl Sight {
+    fn into_crossings(self) -> Option<Crossings> {
+        match self {
+            Self::Sorted(_) => None,
+            Self::Walked(crossings) => Some(crossings),
+        }
+    }
+}
+
 /// A device without a scene.
 struct Opened {
     gpu: Arc<Gpu>,
@@ -179,11 +188,15 @@ impl Method for Shell {
                 (last.sight, last.seen)
             }
             last => {
-                spare = last.and_then(|last| last.seen);
+                let mut spare_crossings = None;
+                if let Some(last) = last {
+                    spare = last.seen;
+                    spare_crossings = last.sight.into_crossings();
+                }
                 let crossings = walks.then(|| {
                     self.progress.stage("finding where rays enter");
                     let ways = ways(&mut self.ways, &self.scene.shell);
-                    Crossings::new(ways.faces(), &self.scene.shell, view)
+                    Crossings::new(ways.faces(), &self.scene.shell, view, spare_crossings)
                 });
                 let sight = match crossings {
                     Some(crossings) if walk::holds(&self.gpu, &self.scene.shell, &crossings) => {
