@@ -86,7 +86,7 @@ impl AddAssign for DrawTimes {
 
 /// How long a submission should take: so soon an interrupt is obeyed, and long before a system gives a device up.
 const PATIENCE: Duration = Duration::from_millis(250);
-/// The first submission has one of so many parts of all vertices.
+/// The first submission of a target's first draw has one of so many parts of all vertices.
 const FIRST_PART: u64 = 16;
 /// The next may be larger than the one before it by this factor.
 const MOST_GROWTH: f64 = 8.0;
@@ -94,8 +94,8 @@ const MOST_GROWTH: f64 = 8.0;
 /// Draws, copies a target of the host's to its memory, and waits for all of it. Device times
 /// are `None` where the device has no timestamps.
 ///
-/// The work is submitted in parts of about a quarter of a second, judged by the part before. Where they end makes no difference
-/// to the picture.
+/// The work is submitted in parts of about a quarter of a second, judged by the part before, and the first one by the target's last
+/// draw: at the end of each, processors wait for one another. Where they end makes no difference to the picture.
 ///
 /// # Errors
 /// [`Error::OutOfMemory`](crate::Error::OutOfMemory) or [`Error::Device`](crate::Error::Device) where the device fails, and
@@ -119,7 +119,9 @@ pub fn draw(draw: &Draw<'_>) -> Result<Option<DrawTimes>> {
     let count =
         |rest: &VecDeque<Batch<'_>>| -> u64 { rest.iter().map(|batch| batch.vertices.len() as u64).sum() };
     let all = count(&rest);
-    let mut part = all.div_ceil(FIRST_PART);
+    let known = target.pace.get().map(|seconds| (PATIENCE.as_secs_f64() / seconds) as u64);
+    let mut part = known.unwrap_or_else(|| all.div_ceil(FIRST_PART));
+    let start = Instant::now();
     let mut times = DrawTimes::default();
     let mut render_pass = if draw.clears { target.clearing } else { target.continuing };
     loop {
@@ -130,6 +132,7 @@ pub fn draw(draw: &Draw<'_>) -> Result<Option<DrawTimes>> {
             times += timestamps.read()?;
         }
         if rest.is_empty() {
+            target.pace.set(Some(start.elapsed().as_secs_f64() / all.max(1) as f64));
             return Ok(timestamps.map(|_| times));
         }
         (draw.between)(1.0 - count(&rest) as f64 / all as f64)?;

@@ -1,7 +1,6 @@
 //! The floating-point targets that pictures are drawn in, and read from: by the host, or by shaders.
 
 use std::cell::Cell;
-use std::marker::PhantomData;
 use std::sync::Arc;
 
 use ash::vk;
@@ -32,8 +31,8 @@ pub struct Target {
     pub(super) framebuffer: vk::Framebuffer,
     pub(super) format: Rgba,
     pub(super) gpu: Arc<Gpu>,
-    // What is drawn is read from the same memory: one thread at a time may do either.
-    not_shared: PhantomData<Cell<()>>,
+    /// Seconds a vertex of the last draw. It also keeps threads apart: what is drawn is read from the same memory.
+    pub(super) pace: Cell<Option<f64>>,
 }
 
 /// Who reads a target.
@@ -134,7 +133,7 @@ impl Target {
             framebuffer: vk::Framebuffer::null(),
             format,
             gpu: gpu.clone(),
-            not_shared: PhantomData,
+            pace: Cell::new(None),
         })
     }
 
