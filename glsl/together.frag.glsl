@@ -18,7 +18,7 @@ layout(location = 0) out vec4 out_rgba; // premultiplied
 layout(location = 1) out vec4 out_depth; // (distance * alpha, 0, 0, alpha)
 #endif
 
-const uint MOST_WALKERS = 8;
+const uint MOST_WALKERS = 16;
 uint places[MOST_WALKERS]; // where each has entered its tetrahedron
 uint exits[MOST_WALKERS];  // where it leaves it
 float ends[MOST_WALKERS];  // how deep that is
