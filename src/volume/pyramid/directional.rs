@@ -34,9 +34,9 @@ pub fn levels(full: &Volume, geometry: &Geometry) -> Vec<Volume> {
     let visibility = Visibility::from_above(full, geometry.edges(0)[2]);
     // One after the other, as each holds as much as the volume again. From outside, u and v are seen from either side, w from above.
     let seen = [
-        beams_along(full, geometry, 0, &visibility, Passage::from_both),
-        beams_along(full, geometry, 1, &visibility, Passage::from_both),
-        beams_along(full, geometry, 2, &visibility, |passage: Passage| passage),
+        beams_along(full, geometry, 0, Some(&visibility), Passage::from_both),
+        beams_along(full, geometry, 1, Some(&visibility), Passage::from_both),
+        beams_along(full, geometry, 2, None, |passage: Passage| passage),
     ];
     let merged = |level: usize| {
         let size = geometry.sizes[level];
@@ -50,26 +50,25 @@ pub fn levels(full: &Volume, geometry: &Geometry) -> Vec<Volume> {
     (1..geometry.sizes.len()).map(merged).collect()
 }
 
-/// What comes through each texel of each level after the first along an axis, as if it were as long as the level's mean beam.
+/// What comes through each texel of each level after the first along an axis, as if it were as long as the level's mean beam;
+/// without `visibility` all is seen.
 fn beams_along<const SIDES: usize>(
     full: &Volume,
     geometry: &Geometry,
     axis: usize,
-    visibility: &Visibility,
+    visibility: Option<&Visibility>,
     seen: impl Fn(Passage<SIDES>) -> Passage + Sync,
 ) -> Vec<Vec<Passage>> {
-    let mut columns = None::<(Columns<SIDES>, Visibility)>;
+    let mut columns = None::<(Columns<SIDES>, Option<Visibility>)>;
     let mut levels = Vec::new();
     for (level, size) in geometry.sizes.iter().enumerate().skip(1) {
         let pieces = size[axis];
-        let (merged, visible) = match &columns {
-            None => {
-                let edge = geometry.edges(0)[axis];
-                (Columns::of(full, axis, pieces, edge), visibility.mean_along(axis, pieces))
-            }
-            Some((columns, visible)) => (columns.coarser(pieces), visible.mean_along(axis, pieces)),
+        let (merged, finer) = match &columns {
+            None => (Columns::of(full, axis, pieces, geometry.edges(0)[axis]), visibility),
+            Some((columns, visible)) => (columns.coarser(pieces), visible.as_ref()),
         };
-        levels.push(bundles(&merged, &visible, axis, geometry, level, &seen));
+        let visible = finer.map(|finer| finer.mean_along(axis, pieces));
+        levels.push(bundles(&merged, visible.as_ref(), axis, geometry, level, &seen));
         columns = Some((merged, visible));
     }
     levels
@@ -78,7 +77,7 @@ fn beams_along<const SIDES: usize>(
 /// The mean over the columns under each texel of a level.
 fn bundles<const SIDES: usize>(
     columns: &Columns<SIDES>,
-    visibility: &Visibility,
+    visibility: Option<&Visibility>,
     axis: usize,
     geometry: &Geometry,
     level: usize,
@@ -106,8 +105,8 @@ fn bundles<const SIDES: usize>(
             return Passage::NOTHING;
         }
         let passages = covered().map(|(column, area)| {
-            let weight = if axis == 2 { area } else { area * visibility.at(column) };
-            (weight, columns.passage(column, reach))
+            let visible = visibility.map_or(1.0, |visibility| visibility.at(column));
+            (area * visible, columns.passage(column, reach))
         });
         let mean = Passage::mean(passages.collect::<Vec<_>>().into_iter());
         seen(mean).stretched(stretch)
