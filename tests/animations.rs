@@ -30,11 +30,23 @@ fn scene(sequence: &mut Sequence, frame: u32) -> Arc<Scene> {
     Arc::new(loaded.unwrap_or_else(|error| panic!("frame {frame}: {error}")).scene)
 }
 
+/// The override that puts the scene's recipe, of a few texels, in place of itself: no order depends on the volume.
+fn coarse_recipe(path: &Path, folder: &Path) -> String {
+    let read = |path: &Path| -> toml::Table { std::fs::read_to_string(path).unwrap().parse().unwrap() };
+    let recipe = read(path)["volume"]["recipe"].as_str().expect("a recipe").to_owned();
+    let mut coarse = read(&path.parent().unwrap().join(recipe));
+    coarse["size"] = toml::Value::from(vec![8, 8, 4]);
+    let file = folder.join(path.file_name().unwrap());
+    std::fs::write(&file, coarse.to_string()).unwrap();
+    format!("volume.recipe={}", file.display())
+}
+
 /// Along the rays of all pixels of a small picture.
 #[test]
 fn no_frame_has_a_violation_of_its_order() {
+    let folder = tempfile::tempdir().unwrap();
     for path in paths() {
-        let mut sequence = open(&path, &["image.size=[48, 36]"]);
+        let mut sequence = open(&path, &["image.size=[48, 36]", &coarse_recipe(&path, folder.path())]);
         let mut found = Check::default();
         let mut sorter = None;
         let mut reversed = 0;
