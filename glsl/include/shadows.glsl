@@ -13,15 +13,16 @@ float growths_done(vec4 from, vec4 to, float depth) {
     return dot(clamp((depth - from) / max(to - from, 1e-7), 0.0, 1.0), vec4(1.0));
 }
 
-// Of the medium alone, along the ray of one pixel.
-float transmittance_until(ivec2 pixel, float depth) {
-    vec4 whole = texelFetch(curves, ivec3(pixel, 0), 0);
+// Of the medium alone, along the ray of the pixel whose centre is there in the image. Not texelFetch, for which lavapipe 22.3 looks up
+// the level of detail of each pixel by itself: of its instructions that is more than half.
+float transmittance_until(vec2 at, float depth) {
+    vec4 whole = textureLod(curves, vec3(at, 0.0), 0.0);
     // Not silently: what is lit by this is not finite, and the host sees that.
     if (whole.x == UNRESOLVED) return uintBitsToFloat(0x7f800000u);
     float doublings = floor(0.5 * whole.x);
     float opacity_of_all = whole.x - 2.0 * doublings;
     int part = int(depth > whole.y) + int(depth > whole.z) + int(depth > whole.w);
-    vec4 from = texelFetch(curves, ivec3(pixel, 1 + part), 0);
+    vec4 from = textureLod(curves, vec3(at, float(1 + part)), 0.0);
     vec4 to = vec4(from.yzw, part == 0 ? whole.y : part == 1 ? whole.z : part == 2 ? whole.w : 3.0e38);
     float done = 4.0 * float(part) + growths_done(from, to, depth);
     return opacity_of_all == 0.0 ? 1.0 : 1.0 - min(done * exp2(doublings) * LEAST_GROWTH, opacity_of_all);
@@ -52,14 +53,15 @@ float let_through(uint first, vec3 point) {
     }
     vec2 low = floor(corner);
     vec2 part = corner - low;
+    vec2 pixel = 1.0 / vec2(textureSize(curves, 0).xy);
     float sum = 0.0;
     for (int j = 0; j < 4; j++) {
         ivec2 offset = ivec2(j & 1, j >> 1);
         vec2 weights = mix(1.0 - part, part, vec2(offset));
-        ivec2 pixel = ivec2(low) + offset;
-        float through = transmittance_until(pixel, place.z);
+        vec2 at = (low + vec2(offset) + 0.5) * pixel;
+        float through = transmittance_until(at, place.z);
 #ifdef SOLIDS
-        vec4 blocker = texelFetch(blockers, pixel, 0);
+        vec4 blocker = textureLod(blockers, at, 0.0);
         if (blocker.w > 0.0 && place.z > blocker_depth(blocker.xyz, place.xy, is_parallel)) through = 0.0;
 #endif
         sum += weights.x * weights.y * through;

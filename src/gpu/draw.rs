@@ -51,9 +51,11 @@ impl Sampled<'_> {
         }
     }
 
-    pub(super) fn sampler_and_view(&self) -> (vk::Sampler, vk::ImageView) {
+    /// Where `minified`, with all mip levels.
+    pub(super) fn sampler_and_view(&self, minified: bool) -> (vk::Sampler, vk::ImageView) {
         match self {
-            Self::Texture(texture) => (texture.sampler, texture.image.view),
+            Self::Texture(texture) if minified => (texture.sampler, texture.image.view),
+            Self::Texture(texture) => (texture.sampler, texture.image.first_level()),
             Self::Picture(target) => (target.sampler, target.images[0].view),
         }
     }

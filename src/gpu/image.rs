@@ -11,12 +11,14 @@ use super::device::{Gpu, vulkan_error};
 use super::memory::{allocate, free};
 use crate::Result;
 
-/// An image with its memory, one view of all of it, and one of each layer where it has several.
+/// An image with its memory, one view of all of it, one of each layer where it has several, and one of the first mip level where it has
+/// several.
 #[derive(Debug)]
 pub(super) struct DeviceImage {
     pub(super) raw: vk::Image,
     pub(super) view: vk::ImageView,
     layers: Vec<vk::ImageView>,
+    first_level: Option<vk::ImageView>,
     allocation: ManuallyDrop<Allocation>,
     gpu: Arc<Gpu>,
 }
@@ -59,6 +61,7 @@ impl DeviceImage {
             raw,
             view: vk::ImageView::null(),
             layers: Vec::new(),
+            first_level: None,
             allocation: ManuallyDrop::new(allocation),
             gpu: gpu.clone(),
         };
@@ -72,7 +75,7 @@ impl DeviceImage {
             .components(channels)
             .subresource_range(vk::ImageSubresourceRange { aspect_mask: aspect, ..whole() });
         let view = |info: &vk::ImageViewCreateInfo<'_>| {
-            // SAFETY: each view covers the image that was just made, or a layer that it has.
+            // SAFETY: each view covers the image that was just made, or a layer or level that it has.
             unsafe { gpu.raw.create_image_view(info, None) }
                 .map_err(|error| vulkan_error(&format!("creating the view of {name}"), error))
         };
@@ -89,7 +92,16 @@ impl DeviceImage {
                 image.layers.push(view(&of_layer)?);
             }
         }
+        if info.mip_levels > 1 {
+            let range = vk::ImageSubresourceRange { aspect_mask: aspect, level_count: 1, ..whole() };
+            image.first_level = Some(view(&view_info.subresource_range(range))?);
+        }
         Ok(image)
+    }
+
+    /// The view of no other mip level than the first.
+    pub(super) fn first_level(&self) -> vk::ImageView {
+        self.first_level.unwrap_or(self.view)
     }
 
     /// One view a layer.
@@ -103,7 +115,7 @@ impl Drop for DeviceImage {
         // SAFETY: every submission that used the image was waited for; destroying a null view does nothing.
         unsafe {
             self.gpu.raw.destroy_image_view(self.view, None);
-            for &layer in &self.layers {
+            for &layer in self.layers.iter().chain(&self.first_level) {
                 self.gpu.raw.destroy_image_view(layer, None);
             }
             self.gpu.raw.destroy_image(self.raw, None);

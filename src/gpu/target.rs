@@ -96,7 +96,11 @@ impl Target {
             target.depth = Some(DeviceImage::new(gpu, name, &info, vk::ImageViewType::TYPE_2D, aspect)?);
         }
         let clamp = vk::SamplerAddressMode::CLAMP_TO_EDGE;
-        let sampler_info = vk::SamplerCreateInfo::default().address_mode_u(clamp).address_mode_v(clamp);
+        // With a bound of 0 lavapipe 22.3 would look up the level of each pixel by itself, as if there were several.
+        let sampler_info = vk::SamplerCreateInfo::default()
+            .address_mode_u(clamp)
+            .address_mode_v(clamp)
+            .max_lod(vk::LOD_CLAMP_NONE);
         // SAFETY: a plain sampler of a device that outlives it.
         target.sampler = unsafe { gpu.raw.create_sampler(&sampler_info, None) }
             .map_err(|error| vulkan_error("creating a sampler", error))?;

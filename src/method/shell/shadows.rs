@@ -311,6 +311,7 @@ impl Shadows {
             uniform_buffers: &[],
             texel_buffers: &[18, 19, 20, 21],
             textures: &textures,
+            minified,
             push_constant_bytes: size_of::<ViewConstants>() as u32,
             keeps: Keeps::Nearest,
         };
@@ -353,6 +354,7 @@ impl Shadows {
             uniform_buffers: &[],
             texel_buffers: &[],
             textures: &[],
+            minified: false,
             push_constant_bytes: size_of::<ViewConstants>() as u32,
             keeps: Keeps::Nearest,
         };

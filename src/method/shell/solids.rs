@@ -94,6 +94,7 @@ impl SolidView {
             uniform_buffers: &[],
             texel_buffers: &[],
             textures: &[],
+            minified: false,
             push_constant_bytes: size_of::<ViewConstants>() as u32,
             keeps: Keeps::Nearest,
         };
@@ -109,6 +110,7 @@ impl SolidView {
                 (true, true) => &[5, 6],
             },
             textures: if on.contains(&"SHADOWS") { &textures } else { &textures[2..] },
+            minified: true,
             keeps: Keeps::Last,
             ..solid
         };
