@@ -4,8 +4,14 @@ const uint PLAN_DEFAULT = 0; // midpoints, spread by length
 const uint PLAN_PAPER = 1;   // midpoints, as many in every tetrahedron
 const uint PLAN_EXACT = 2;   // Gauss in each voxel
 
+// `Levels` of src/method/shell/constants.rs
+const uint LEVELS_FIRST = 0;
+const uint LEVELS_BLENDED_BY_SHADER = 1;
+const uint LEVELS_BLENDED_BY_DEVICE = 2;
+
 layout(constant_id = 0) const uint PLAN = 0;
-layout(constant_id = 1) const bool MINIFIED = true; // whether any level but 0 can be needed
+layout(constant_id = 1) const uint LEVELS = LEVELS_BLENDED_BY_SHADER;
+const bool MINIFIED = LEVELS != LEVELS_FIRST; // whether any level but 0 can be needed
 
 layout(constant_id = 2) const bool EXTINCTION = false; // what the fourth channel holds; else opacity
 
@@ -51,13 +57,18 @@ float level_of_detail(Path path, float depth) {
     return clamp(log2(depth * path.detail), 0.0, view.last_level);
 }
 
-// Blends two levels by hand: hardware may round the blend's weight to 8 bits.
-vec4 fetch(Path path, float depth) {
+// Of a texture at the level of detail that is right there. Many devices round the weight by which they blend two levels.
+vec4 fetch_from(sampler3D texels, Path path, float depth) {
     vec3 point = path.at_eye + depth * path.from_depth;
-    if (!MINIFIED) return textureLod(volume, point, 0.0);
+    if (!MINIFIED) return textureLod(texels, point, 0.0);
     float level = level_of_detail(path, depth);
+    if (LEVELS == LEVELS_BLENDED_BY_DEVICE) return textureLod(texels, point, level);
     float fine = floor(level);
-    return mix(textureLod(volume, point, fine), textureLod(volume, point, min(fine + 1.0, view.last_level)), level - fine);
+    return mix(textureLod(texels, point, fine), textureLod(texels, point, min(fine + 1.0, view.last_level)), level - fine);
+}
+
+vec4 fetch(Path path, float depth) {
+    return fetch_from(volume, path, depth);
 }
 
 // How many samples the plan gives to a segment: no more than `MOST_SAMPLES` of src/method/shell.

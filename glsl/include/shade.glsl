@@ -9,16 +9,6 @@ layout(constant_id = 4) const bool GLOW = false; // whether bright colours do
 
 layout(set = 0, binding = 9) uniform sampler3D directions; // times their weight, which is the fourth
 
-// As `fetch`.
-vec4 fetch_direction(Path path, float depth) {
-    vec3 point = path.at_eye + depth * path.from_depth;
-    if (!MINIFIED) return textureLod(directions, point, 0.0);
-    float level = level_of_detail(path, depth);
-    float fine = floor(level);
-    return mix(textureLod(directions, point, fine), textureLod(directions, point, min(fine + 1.0, view.last_level)),
-               level - fine);
-}
-
 // A point, as light meets it.
 struct Spot {
     vec3 at;        // in world space around the eye
@@ -57,7 +47,7 @@ void add_light(uint light_index, Spot spot, inout vec3 scattered, inout vec3 mir
 // A texel as it is lit: its alpha, and the colour that it sends to the eye, premultiplied as before.
 vec4 lit(vec4 texel, Path path, float depth) {
     if (!(texel.a > LEAST)) return texel;
-    vec4 weighted = fetch_direction(path, depth);
+    vec4 weighted = fetch_from(directions, path, depth);
     vec3 direction = (frame_at_eye + depth * frame_from_depth) * weighted.xyz;
     float size = length(direction);
     bool has_direction = weighted.w > LEAST && size > LEAST;

@@ -2,7 +2,7 @@
 
 use std::mem::ManuallyDrop;
 use std::str::FromStr;
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, OnceLock};
 
 use ash::vk;
 use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
@@ -67,6 +67,8 @@ pub struct Gpu {
     /// Nanoseconds a timestamp tick, where the queue has timestamps.
     pub(super) timestamp_period: Option<f64>,
     pub(super) allocator: ManuallyDrop<Mutex<Allocator>>,
+    /// Once that was measured.
+    pub(super) blends_levels: OnceLock<bool>,
     physical: vk::PhysicalDevice,
     info: DeviceInfo,
     instance: Instance,
@@ -142,6 +144,7 @@ impl Gpu {
             limits: properties.limits,
             timestamp_period: has_timestamps.then_some(f64::from(properties.limits.timestamp_period)),
             allocator: ManuallyDrop::new(Mutex::new(allocator)),
+            blends_levels: OnceLock::new(),
             physical,
             info,
             instance,

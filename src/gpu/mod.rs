@@ -13,6 +13,7 @@ pub mod draw;
 mod format;
 mod image;
 pub mod instance;
+mod levels;
 mod memory;
 pub mod pipeline;
 pub mod shaders;

@@ -46,6 +46,14 @@ const FILTERED: vk::FormatFeatureFlags = vk::FormatFeatureFlags::from_raw(
 /// A mip level: its size, and its texels as `T`, u fastest.
 type Level<'a, T> = ([u32; 3], &'a [T]);
 
+/// What is read between two levels of detail: their mean, where the device knows that well enough.
+fn between_levels(gpu: &Arc<Gpu>) -> Result<vk::SamplerMipmapMode> {
+    Ok(match gpu.blends_levels()? {
+        true => vk::SamplerMipmapMode::LINEAR,
+        false => vk::SamplerMipmapMode::NEAREST,
+    })
+}
+
 impl Texture3d {
     /// Uploads all levels in the most accurate format that the device filters linearly.
     ///
@@ -57,7 +65,7 @@ impl Texture3d {
     pub fn upload(gpu: &Arc<Gpu>, name: &'static str, pyramid: &Pyramid) -> Result<Self> {
         let levels: Vec<Level<'_, _>> =
             pyramid.levels.iter().map(|level| (level.size, level.texels.as_slice())).collect();
-        Self::upload_colours(gpu, name, &levels)
+        Self::upload_colours(gpu, name, &levels, between_levels(gpu)?)
     }
 
     /// The same for directions.
@@ -70,7 +78,7 @@ impl Texture3d {
     pub fn upload_directions(gpu: &Arc<Gpu>, name: &'static str, directions: &Directions) -> Result<Self> {
         let levels: Vec<Level<'_, _>> =
             directions.levels.iter().map(|level| (level.size, level.texels.as_slice())).collect();
-        Self::upload_colours(gpu, name, &levels)
+        Self::upload_colours(gpu, name, &levels, between_levels(gpu)?)
     }
 
     /// Uploads distances, read as parts of 255, of the box that a sample is in.
@@ -87,7 +95,8 @@ impl Texture3d {
         Self::check_sides(gpu, name, levels[0].0)?;
         // Vulkan has every device sample this format.
         let format = (vk::Format::R8_UNORM, vk::ComponentMapping::default());
-        Self::upload_levels(gpu, name, format, vk::Filter::NEAREST, &levels, |texels| Cow::Borrowed(texels))
+        let filters = (vk::Filter::NEAREST, vk::SamplerMipmapMode::NEAREST);
+        Self::upload_levels(gpu, name, format, filters, &levels, |texels| Cow::Borrowed(texels))
     }
 
     /// Uploads the fourth channel of all levels, which is all that shaders see of the texels then: a quarter of the memory. `None`
@@ -109,25 +118,32 @@ impl Texture3d {
         Self::check_sides(gpu, name, levels[0].0)?;
         let zero = vk::ComponentSwizzle::ZERO;
         let channels = vk::ComponentMapping { r: zero, g: zero, b: zero, a: vk::ComponentSwizzle::R };
-        Self::upload_levels(gpu, name, (format, channels), vk::Filter::LINEAR, &levels, |texels| {
+        let filters = (vk::Filter::LINEAR, between_levels(gpu)?);
+        Self::upload_levels(gpu, name, (format, channels), filters, &levels, |texels| {
             Cow::Owned(texels.iter().flat_map(|texel| texel[3].to_ne_bytes()).collect())
         })
         .map(Some)
     }
 
-    fn upload_colours(gpu: &Arc<Gpu>, name: &'static str, levels: &[Level<'_, [f32; 4]>]) -> Result<Self> {
+    pub(super) fn upload_colours(
+        gpu: &Arc<Gpu>,
+        name: &'static str,
+        levels: &[Level<'_, [f32; 4]>],
+        between: vk::SamplerMipmapMode,
+    ) -> Result<Self> {
         assert_is_pyramid(levels);
         let count = u32::try_from(levels.len()).expect("at most 32 levels");
         let (format, _) = Self::check(gpu, name, levels[0].0, count)?;
         let raw = (format.raw(), vk::ComponentMapping::default());
-        Self::upload_levels(gpu, name, raw, vk::Filter::LINEAR, levels, |texels| format.encode(texels))
+        let filters = (vk::Filter::LINEAR, between);
+        Self::upload_levels(gpu, name, raw, filters, levels, |texels| format.encode(texels))
     }
 
     fn upload_levels<T>(
         gpu: &Arc<Gpu>,
         name: &'static str,
         (format, channels): (vk::Format, vk::ComponentMapping),
-        filter: vk::Filter,
+        (filter, between): (vk::Filter, vk::SamplerMipmapMode),
         pyramid: &[Level<'_, T>],
         encode: impl for<'a> Fn(&'a [T]) -> Cow<'a, [u8]>,
     ) -> Result<Self> {
@@ -181,7 +197,7 @@ impl Texture3d {
         let sampler_info = vk::SamplerCreateInfo::default()
             .mag_filter(filter)
             .min_filter(filter)
-            .mipmap_mode(vk::SamplerMipmapMode::NEAREST)
+            .mipmap_mode(between)
             .address_mode_u(vk::SamplerAddressMode::REPEAT)
             .address_mode_v(vk::SamplerAddressMode::REPEAT)
             .address_mode_w(vk::SamplerAddressMode::CLAMP_TO_EDGE)

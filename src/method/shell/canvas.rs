@@ -1,6 +1,6 @@
 //! What a frame of one size and kind needs on the device beside the scene: its target, pipelines and the buffers of what is seen.
 
-use super::constants::{ViewConstants, constants_of_volume};
+use super::constants::{Levels, ViewConstants, constants_of_volume};
 use super::lit::{self, LitView, Sight as LitSight};
 use super::seen::{Run, Seen};
 use super::solids::SolidView;
@@ -168,7 +168,8 @@ impl Shell {
         ];
         let skips = self.scene.skips;
         let minified = seen.minified || !skips.allow(Skip::Levels);
-        let mut constants = constants_of_volume(self.scene.march, minified, &self.scene.volume).to_vec();
+        let mut constants =
+            constants_of_volume(self.scene.march, self.volume.levels(minified), &self.scene.volume).to_vec();
         let shading = self.scene.shading.as_ref();
         let fibre = shading.is_some_and(|shading| shading.model == Model::Fibre);
         let glow = shading.is_some_and(|shading| shading.emission.glow > 0.0);
@@ -259,7 +260,7 @@ impl Shell {
                 let mut constants = kind.constants.clone();
                 constants[..3].copy_from_slice(&constants_of_volume(
                     self.scene.march,
-                    false,
+                    Levels::First,
                     &self.scene.volume,
                 ));
                 let magnified = PipelineInfo { constants: &constants, minified: false, ..walked };

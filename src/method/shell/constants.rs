@@ -47,10 +47,18 @@ fn plan(march: March) -> u32 {
     }
 }
 
+/// `LEVELS` of `glsl/include/sample.glsl`: of a texture's levels of detail, what is read.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Levels {
+    First = 0,
+    BlendedByShader = 1,
+    BlendedByDevice = 2,
+}
+
 /// The specialisation constants of `glsl/include/sample.glsl`.
-pub(super) fn constants_of_volume(march: March, minified: bool, volume: &Pyramid) -> [u32; 3] {
+pub(super) fn constants_of_volume(march: March, levels: Levels, volume: &Pyramid) -> [u32; 3] {
     let is_extinction = volume.levels[0].quantity == Quantity::Extinction;
-    [plan(march), u32::from(minified), u32::from(is_extinction)]
+    [plan(march), levels as u32, u32::from(is_extinction)]
 }
 
 impl ViewConstants {

@@ -11,7 +11,7 @@ use std::sync::Arc;
 use bytemuck::{Pod, Zeroable};
 use glam::DVec3;
 
-use super::constants::{ViewConstants, constants_of_volume};
+use super::constants::{Levels, ViewConstants, constants_of_volume};
 use super::lens::{NEAR, PictureFrame, SeenByLight};
 use super::volume::DeviceVolume;
 use super::walk::{self, RayBuffers, Ways};
@@ -246,7 +246,7 @@ impl Shadows {
             let minified = seen.minified || !scene.skips.allow(Skip::Levels);
             let pipelines = &mut pipelines[usize::from(minified)];
             if pipelines.is_none() {
-                *pipelines = Some(self.curve_pipelines(gpu, scene, leaps, minified)?);
+                *pipelines = Some(self.curve_pipelines(gpu, scene, leaps, volume.levels(minified))?);
             }
             let CurvePipelines { walk: walking, left } = pipelines.as_ref().expect("made just now");
             let cells_of_left =
@@ -287,7 +287,7 @@ impl Shadows {
         gpu: &Arc<Gpu>,
         scene: &Scene,
         leaps: bool,
-        minified: bool,
+        levels: Levels,
     ) -> Result<CurvePipelines> {
         let mut switches = Vec::new();
         let mut textures = vec![8];
@@ -299,7 +299,7 @@ impl Shadows {
             switches.push("SOLIDS");
             textures.push(14);
         }
-        let mut constants = constants_of_volume(March::default(), minified, &scene.volume).to_vec();
+        let mut constants = constants_of_volume(March::default(), levels, &scene.volume).to_vec();
         // Of these the last is used: whether rays begin in the shell.
         let is_any_inside = self.views.iter().any(|view| !view.is_parallel);
         constants.extend([0, 0, u32::from(is_any_inside)]);
@@ -311,7 +311,7 @@ impl Shadows {
             uniform_buffers: &[],
             texel_buffers: &[18, 19, 20, 21],
             textures: &textures,
-            minified,
+            minified: levels != Levels::First,
             push_constant_bytes: size_of::<ViewConstants>() as u32,
             keeps: Keeps::Nearest,
         };

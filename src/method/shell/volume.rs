@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
+use super::constants::Levels;
 use crate::gpu::{Gpu, Sampled, Texture3d};
 use crate::volume::{Proximity, Pyramid};
 use crate::{Error, Result};
@@ -18,6 +19,8 @@ pub struct DeviceVolume {
     /// Where enough of it is empty.
     proximity: Option<Texture3d>,
     emptiness: f64,
+    /// Whether the device blends levels of detail as well as a shader does.
+    blends_levels: bool,
 }
 
 impl DeviceVolume {
@@ -40,7 +43,8 @@ impl DeviceVolume {
                 proximity = Some(Texture3d::upload_proximity(gpu, "the volume's distances", &distances)?);
             }
         }
-        Ok(Self { texture, alpha: OnceCell::new(), proximity, emptiness })
+        let blends_levels = gpu.blends_levels()?;
+        Ok(Self { texture, alpha: OnceCell::new(), proximity, emptiness, blends_levels })
     }
 
     /// Whether there are distances by which rays can leap.
@@ -51,6 +55,15 @@ impl DeviceVolume {
     /// The part, 0..1, of the full volume in which nothing is seen; at most that, where it is too little to leap.
     pub fn emptiness(&self) -> f64 {
         self.emptiness
+    }
+
+    /// Of its levels of detail, what shaders read.
+    pub(super) fn levels(&self, minified: bool) -> Levels {
+        match (minified, self.blends_levels) {
+            (false, _) => Levels::First,
+            (true, false) => Levels::BlendedByShader,
+            (true, true) => Levels::BlendedByDevice,
+        }
     }
 
     /// By the binding that shaders name.
