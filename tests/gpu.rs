@@ -43,6 +43,7 @@ fn shell_pipeline(push_constant_bytes: u32) -> PipelineInfo<'static> {
         uniform_buffers: &[],
         texel_buffers: &[],
         textures: &[8],
+        minified: true,
         push_constant_bytes,
         keeps: Keeps::Blend,
     }

@@ -14,6 +14,7 @@ use std::path::Path;
 use image::codecs::openexr::OpenExrDecoder;
 use image::codecs::png::{PngDecoder, PngEncoder};
 use image::{DynamicImage, ExtendedColorType, ImageDecoder, ImageEncoder, ImageError, Limits};
+use rayon::prelude::*;
 
 pub use mark::{is_whole, mark};
 pub use picture::{is_picture, read_picture};
@@ -161,7 +162,7 @@ pub(crate) fn write_png(writer: impl Write, image: &Image, backdrop: &Backdrop) 
     let byte = |x: f32| (255.0 * x.clamp(0.0, 1.0)).round() as u8;
     let srgb_byte = |linear: f32| byte(srgb_from_linear(linear.clamp(0.0, 1.0)));
     let develop = backdrop.develop(width, height);
-    let developed = image.rgba.iter().enumerate().map(|(index, &pixel)| develop(index, pixel));
+    let developed = image.rgba.par_iter().enumerate().map(|(index, &pixel)| develop(index, pixel));
     if backdrop.behind == Behind::Nothing {
         let straight = |[r, g, b, a]: [f32; 4]| {
             // Where nothing that is left covers the pixel, colour has no meaning.
@@ -169,11 +170,11 @@ pub(crate) fn write_png(writer: impl Write, image: &Image, backdrop: &Backdrop) 
             let [r, g, b] = [r, g, b].map(|x| if alpha > 0 { srgb_byte(x / a) } else { 0 });
             [r, g, b, alpha]
         };
-        let bytes: Vec<u8> = developed.flat_map(straight).collect();
-        encoder.write_image(&bytes, width, height, ExtendedColorType::Rgba8)
+        let pixels: Vec<[u8; 4]> = developed.map(straight).collect();
+        encoder.write_image(pixels.as_flattened(), width, height, ExtendedColorType::Rgba8)
     } else {
-        let bytes: Vec<u8> = developed.flat_map(|[r, g, b, _]| [r, g, b].map(srgb_byte)).collect();
-        encoder.write_image(&bytes, width, height, ExtendedColorType::Rgb8)
+        let pixels: Vec<[u8; 3]> = developed.map(|[r, g, b, _]| [r, g, b].map(srgb_byte)).collect();
+        encoder.write_image(pixels.as_flattened(), width, height, ExtendedColorType::Rgb8)
     }
 }
 
@@ -185,8 +186,9 @@ pub fn opaque_srgb(image: &Image, backdrop: &Backdrop) -> Result<Vec<u8>> {
     check_numbers(Path::new("the frame"), image)?;
     let byte = |x: f32| (255.0 * srgb_from_linear(x.clamp(0.0, 1.0)).clamp(0.0, 1.0)).round() as u8;
     let develop = backdrop.develop(image.width, image.height);
-    let developed = image.rgba.iter().enumerate().map(|(index, &pixel)| develop(index, pixel));
-    Ok(developed.flat_map(|[r, g, b, _]| [r, g, b].map(byte)).collect())
+    let developed = image.rgba.par_iter().enumerate().map(|(index, &pixel)| develop(index, pixel));
+    let pixels: Vec<[u8; 3]> = developed.map(|[r, g, b, _]| [r, g, b].map(byte)).collect();
+    Ok(pixels.into_flattened())
 }
 
 fn premultiplied_from_srgb([r, g, b, a]: [f32; 4]) -> [f32; 4] {

@@ -56,6 +56,26 @@ fn measure(gpu: &Arc<Gpu>) -> Result<bool> {
         batches: &[Batch { pipeline: &Pipeline::new(gpu, &target, &info)?, vertices: 0..3 }],
         between: &|_| Ok(()),
     })?;
-    let found = target.read(0);
-    Ok(found.iter().all(|[read, expected, ..]| (read - expected).abs() <= EXACT))
+    Ok(are_exact(&target.read(0)))
+}
+
+/// Of what `glsl/levels.frag.glsl` draws.
+fn are_exact(places: &[[f32; 4]]) -> bool {
+    places.iter().all(|[read, expected, ..]| (read - expected).abs() <= EXACT)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn weights_of_fewer_bits_are_found() {
+        let places = |bits: u32| -> Vec<[f32; 4]> {
+            let level = |place: u32| (0.618_034 * (place as f32 + 0.5)).fract();
+            let rounded = |level: f32| (level * (1 << bits) as f32).round() / (1 << bits) as f32;
+            (0..PLACES).map(level).map(|level| [rounded(level), level, 0.0, 1.0]).collect()
+        };
+        assert!(are_exact(&places(23)));
+        assert!(!are_exact(&places(16)) && !are_exact(&places(8)));
+    }
 }

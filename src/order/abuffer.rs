@@ -476,8 +476,9 @@ mod tests {
             let abuffer = ABuffer::of_view(&world, &faces, &view);
             let raster = abuffer.raster;
             let bands = abuffer.map_bands(
+                vec![(); abuffer.bands().1],
                 || (),
-                |(), band| {
+                |(), band, ()| {
                     let mut pixels = Vec::new();
                     band.each_run(|count, crossings| {
                         pixels.extend(std::iter::repeat_n(crossings.to_vec(), count));
