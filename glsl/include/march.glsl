@@ -32,17 +32,17 @@ vec3 emitted(vec4 texel, float amount) {
 }
 
 #ifdef LIT_SPARSE
-// On from sample `i` to one in which something is, at depth `z`, or to the last: to light a texel costs several times what it costs to
+// On from sample `i` to the next in which something is, at depth `z`; where there is none, past the last, and nothing. To light a texel costs several times what it costs to
 // read one, and of eight pixels that run at once each finds its own before all are lit.
-vec4 find(Path path, Steps steps, inout uint i, out float z, inout uint passes) {
+vec4 next_seen(Path path, Steps steps, inout uint i, out float z, inout uint passes) {
     vec4 texel = vec4(0.0);
     z = 0.0;
     // It has two ends: see `march_midpoints`.
     for (; i < steps.count;) {
+        passes++;
         z = middle(steps, i);
         texel = fetch(path, z);
         if (texel.a > LEAST) break;
-        passes++;
         i = seek(path, steps, i + 1, passes);
         if (i >= steps.count) break;
     }
@@ -58,7 +58,7 @@ void march_midpoints(Path path, Steps steps, uint i, float per_depth, inout Ligh
     for (; i < steps.count;) {
 #ifdef LIT_SPARSE
         float z;
-        vec4 texel = find(path, steps, i, z, passes);
+        vec4 texel = next_seen(path, steps, i, z, passes);
         texel = lit(texel, path, z);
 #else
         float z = middle(steps, i);

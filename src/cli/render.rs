@@ -239,7 +239,10 @@ fn chosen(plan: &[Choice]) -> String {
 fn explain(savings: &[Saving], report: &Report) -> String {
     let saved = |saving: &Saving| {
         let Saving { with, without, difference, .. } = saving;
-        format!("{:9.2} ms of {without:.2} ms; the picture differs by {difference:.1e}", without - with)
+        format!(
+            "{:9.2} ms of {without:.2} ms without it; the picture differs by {difference:.1e}",
+            without - with
+        )
     };
     let saved = table(savings.iter().map(|saving| (saving.skip.name(), saved(saving))));
     let counts = table(report.counts.iter().map(|(name, count)| (name.as_str(), format!("{count:9}"))));

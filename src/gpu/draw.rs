@@ -121,6 +121,7 @@ pub fn draw(draw: &Draw<'_>) -> Result<Option<DrawTimes>> {
     let count =
         |rest: &VecDeque<Batch<'_>>| -> u64 { rest.iter().map(|batch| batch.vertices.len() as u64).sum() };
     let all = count(&rest);
+    // Where a draw takes many times what the last one took, an interrupt waits for that part.
     let known = target.pace.get().map(|seconds| (PATIENCE.as_secs_f64() / seconds) as u64);
     let mut part = known.unwrap_or_else(|| all.div_ceil(FIRST_PART));
     let start = Instant::now();

@@ -21,7 +21,7 @@ impl Gpu {
     /// longer. Measured by drawing, once.
     ///
     /// # Errors
-    /// As [`draw`].
+    /// [`Error::Device`](crate::Error::Device) or [`Error::OutOfMemory`](crate::Error::OutOfMemory) where the device fails.
     pub fn blends_levels(self: &Arc<Self>) -> Result<bool> {
         if let Some(&known) = self.blends_levels.get() {
             return Ok(known);

@@ -1,6 +1,7 @@
 //! The floating-point targets that pictures are drawn in, and read from: by the host, or by shaders.
 
 use std::cell::Cell;
+use std::marker::PhantomData;
 use std::sync::Arc;
 
 use ash::vk;
@@ -31,8 +32,10 @@ pub struct Target {
     pub(super) framebuffer: vk::Framebuffer,
     pub(super) format: Rgba,
     pub(super) gpu: Arc<Gpu>,
-    /// Seconds a vertex of the last draw. It also keeps threads apart: what is drawn is read from the same memory.
+    /// Seconds a vertex of the last draw.
     pub(super) pace: Cell<Option<f64>>,
+    // What is drawn is read from the same memory: one thread at a time may do either.
+    not_shared: PhantomData<Cell<()>>,
 }
 
 /// Who reads a target.
@@ -107,6 +110,11 @@ impl Target {
         target.finish()
     }
 
+    /// Lets the next draw begin with a small part, as if it were the first.
+    pub fn forget_pace(&self) {
+        self.pace.set(None);
+    }
+
     /// Images, but nothing that draws or reads.
     fn empty(
         gpu: &Arc<Gpu>,
@@ -138,6 +146,7 @@ impl Target {
             format,
             gpu: gpu.clone(),
             pace: Cell::new(None),
+            not_shared: PhantomData,
         })
     }
 

@@ -58,7 +58,7 @@ impl Texture3d {
     /// Uploads all levels in the most accurate format that the device filters linearly.
     ///
     /// # Errors
-    /// [`Error::Device`] where a side is longer than the device allows; [`Error::OutOfMemory`].
+    /// [`Error::Device`] where a side is longer than the device allows; [`Error::OutOfMemory`]; those of [`Gpu::blends_levels`].
     ///
     /// # Panics
     /// Where the pyramid has no level, or levels of other sizes than a [`Pyramid`] promises.

@@ -301,9 +301,14 @@ impl ABuffer {
         Self { raster, footprints, bands }
     }
 
-    /// Pixels of a band, of all but the last, and how many bands there are.
-    pub(super) fn bands(&self) -> (usize, usize) {
-        (BAND * self.raster.width, self.bands.len())
+    /// Rows of pixels are worked on in so many bands.
+    pub(super) fn band_count(&self) -> usize {
+        self.bands.len()
+    }
+
+    /// Of each band but the last.
+    pub(super) fn pixels_of_band(&self) -> usize {
+        BAND * self.raster.width
     }
 
     /// Pixels of the picture.
@@ -328,7 +333,7 @@ impl ABuffer {
         };
         self.bands
             .par_iter()
-            .zip(parts)
+            .zip_eq(parts)
             .enumerate()
             .map_init(
                 || (state(), band()),
@@ -476,7 +481,7 @@ mod tests {
             let abuffer = ABuffer::of_view(&world, &faces, &view);
             let raster = abuffer.raster;
             let bands = abuffer.map_bands(
-                vec![(); abuffer.bands().1],
+                vec![(); abuffer.band_count()],
                 || (),
                 |(), band, ()| {
                     let mut pixels = Vec::new();

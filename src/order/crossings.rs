@@ -64,7 +64,7 @@ impl Crossings {
         let Self { mut of_pixels, mut places, .. } = spare;
         of_pixels.resize(abuffer.pixels(), [0; 2]);
         places.clear();
-        let (pixels, _) = abuffer.bands();
+        let pixels = abuffer.pixels_of_band();
         let bands = abuffer.map_bands(
             of_pixels.chunks_mut(pixels).collect(),
             || (),

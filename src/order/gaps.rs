@@ -29,9 +29,8 @@ struct Scratch {
 /// Relates tetrahedra across gaps: lists of `[front, back]`, with duplicates. `tetrahedra` is the number of all. The set of pairs
 /// does not depend on threads.
 pub(super) fn relate(abuffer: &ABuffer, tetrahedra: usize) -> Vec<Vec<[u32; 2]>> {
-    let (_, bands) = abuffer.bands();
     abuffer.map_bands(
-        vec![(); bands],
+        vec![(); abuffer.band_count()],
         || Scratch::new(tetrahedra),
         |scratch, band, ()| {
             let mut pairs = Vec::new();

@@ -195,7 +195,12 @@ impl VolumeSource {
             } => {
                 let laid_over = |(key, value): (&String, &toml::Value)| format!("{key} = {value}");
                 let laid_over: Vec<String> = vary.iter().flatten().map(laid_over).collect();
-                Ok(Self::Recipe(recipe::load_with(base_dir.join(path), &laid_over)?))
+                let file = base_dir.join(path);
+                let recipe = recipe::load_with(&file, &laid_over).map_err(|error| match file.exists() {
+                    true => error,
+                    false => error.with_help("paths in a scene, and those of -D, are relative to the scene file"),
+                })?;
+                Ok(Self::Recipe(recipe))
             }
             VolumeSection { density: Some(_), opacity_distance: Some(_), .. } => Err(text.error(
                 section.span(),

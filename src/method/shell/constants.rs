@@ -98,12 +98,19 @@ mod tests {
     use super::*;
 
     #[test]
-    fn plans_have_the_numbers_of_the_shader() {
+    fn plans_and_levels_have_the_numbers_of_the_shader() {
         let shader = include_str!("../../../glsl/include/sample.glsl");
         for (name, march) in
             [("DEFAULT", March::default()), ("PAPER", March::Paper { samples: 1 }), ("EXACT", March::Exact)]
         {
             assert!(shader.contains(&format!("const uint PLAN_{name} = {};", plan(march))), "{name}");
+        }
+        for (name, levels) in [
+            ("FIRST", Levels::First),
+            ("BLENDED_BY_SHADER", Levels::BlendedByShader),
+            ("BLENDED_BY_DEVICE", Levels::BlendedByDevice),
+        ] {
+            assert!(shader.contains(&format!("const uint LEVELS_{name} = {};", levels as u32)), "{name}");
         }
     }
 

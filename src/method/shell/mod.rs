@@ -75,6 +75,8 @@ struct Shell {
 struct Last {
     view: View,
     vertices: Arc<Vec<DVec3>>,
+    /// Whether rays were to walk: they have, unless they cross the boundary too often for the device.
+    walks: bool,
     sight: Sight,
     /// And of what, unless that has changed; a shell that is no longer needed may go.
     seen: Option<(Seen, Weak<shell::Shell>)>,
@@ -171,14 +173,14 @@ impl Method for Shell {
     fn render(&mut self, view: &View) -> Result<Frame> {
         let mut watch = Stopwatch::start();
         self.interrupt.check()?;
-        let walks = self.walks();
+        let walks = self.walks(view);
         if !self.scene.skips.allow(Skip::Kept) {
             (self.last, self.shadows) = (None, None);
         }
         let is_same_sight = |last: &Last| {
             last.view == *view
                 && Arc::ptr_eq(&last.vertices, &self.scene.shell.vertices)
-                && matches!(last.sight, Sight::Walked(_)) == walks
+                && last.walks == walks
         };
         let mut kept = std::mem::take(&mut self.kept);
         let mut spare = None;
@@ -199,7 +201,9 @@ impl Method for Shell {
                     Crossings::new(ways.faces(), &self.scene.shell, view, spare_crossings)
                 });
                 let sight = match crossings {
-                    Some(crossings) if walk::holds(&self.gpu, &self.scene.shell, &crossings) => {
+                    Some(crossings)
+                        if walk::holds_crossings(self.gpu.most_texels(), &self.scene.shell, &crossings) =>
+                    {
                         Sight::Walked(crossings)
                     }
                     _ => {
@@ -241,13 +245,14 @@ impl Method for Shell {
         let needs_shadows = self.scene.casts_shadows() && !keeps_shadows;
         if matches!(sight, Sight::Walked(_)) || needs_shadows {
             let ways = ways(&mut self.ways, &self.scene.shell);
-            if walk::holds_cells(&self.gpu, &self.scene.shell) {
+            // Else no ray of a light walks, either.
+            if walk::holds(self.gpu.most_texels(), &self.scene.shell, 0) {
                 ways.place(&self.gpu, &self.scene.shell)?;
             }
         }
         if needs_shadows {
             self.progress.stage("drawing shadows");
-            let ways = self.ways.as_ref().expect("placed just now");
+            let ways = self.ways.as_ref().expect("made just now");
             self.shadows = Some(Shadows::draw(
                 &self.gpu,
                 &self.scene,
@@ -344,7 +349,7 @@ impl Method for Shell {
         report.counts.insert("pixels_left_to_host".to_owned(), left);
         report.stages = watch.finish();
         let (vertices, shell) = (self.scene.shell.vertices.clone(), Arc::downgrade(&self.scene.shell));
-        self.last = Some(Last { view: *view, vertices, sight, seen: Some((seen, shell)) });
+        self.last = Some(Last { view: *view, vertices, walks, sight, seen: Some((seen, shell)) });
         Ok(Frame { image: Image { width: view.width, height: view.height, rgba }, depth, report })
     }
 

@@ -1,10 +1,10 @@
-//! Which way a scene is drawn, and what is left out: chosen from the scene alone.
+//! Which way a scene is drawn, and what is left out: chosen from the scene, and from what the device holds.
 
 use super::Shell;
 use super::constants::wanted_samples;
-use super::walk::{MOST_SAMPLES, holds_cells};
+use super::walk::{self, MOST_SAMPLES};
 use crate::method::Choice;
-use crate::scene::{March, Scene, Skip, Traversal};
+use crate::scene::{March, Scene, Skip, Traversal, View};
 
 /// The part of the volume that must be empty for rays to look how far they may leap: to look costs a fetch for every sample that is
 /// taken, which a lit sample, that costs far more, repays earlier; and so does one of a light's ray, for which the curve is kept
@@ -19,12 +19,17 @@ pub(super) fn enough_to_leap(scene: &Scene) -> Option<f64> {
 }
 
 impl Shell {
-    /// Whether rays walk, where the device has room for the view; else tetrahedra are sorted.
-    pub(super) fn walks(&self) -> bool {
+    /// Whether the device has room for rays of this view to walk.
+    fn has_room(&self, view: &View) -> bool {
+        walk::holds(self.gpu.most_texels(), &self.scene.shell, view.width as usize * view.height as usize)
+    }
+
+    /// Whether rays walk, unless they cross the boundary too often; else tetrahedra are sorted.
+    pub(super) fn walks(&self, view: &View) -> bool {
         self.scene.traversal == Traversal::Walk
             && matches!(self.scene.march, March::Default { .. })
             && wanted_samples(self.scene.march, self.texels) <= MOST_SAMPLES
-            && holds_cells(&self.gpu, &self.scene.shell)
+            && self.has_room(view)
     }
 
     /// Whether rays leap over what is empty.
@@ -35,17 +40,16 @@ impl Shell {
     /// See [`Method::plan`](crate::method::Method::plan).
     pub(super) fn choices(&self) -> Vec<Choice> {
         let allows = |skip: Skip| self.scene.skips.allow(skip);
+        let lit = if self.scene.shading.is_some() { "the scene is lit" } else { "the scene is unlit" };
         let empty = format!("{:.0} % of the volume is empty", 100.0 * self.volume.emptiness());
         let switched_off = || "it is switched off".to_owned();
-        let walk = if self.walks() {
+        let walks = self.walks(&self.scene.view);
+        let walk = if walks {
             ("walk", "each ray goes by itself from neighbour to neighbour: nothing need be sorted".to_owned())
         } else if self.scene.traversal == Traversal::Sort {
             ("sort", "march.traversal asks for it".to_owned())
-        } else if !holds_cells(&self.gpu, &self.scene.shell) {
-            (
-                "sort",
-                "the device's buffers are too small for rays to walk through so many tetrahedra".to_owned(),
-            )
+        } else if matches!(self.scene.march, March::Default { .. }) && !self.has_room(&self.scene.view) {
+            ("sort", "the device's buffers of texels are too small for rays to walk".to_owned())
         } else if let March::Default { .. } = self.scene.march {
             let wanted = wanted_samples(self.scene.march, self.texels);
             ("sort", format!("a ray may take {wanted:.0} samples in one tetrahedron: too many to walk"))
@@ -58,9 +62,13 @@ impl Shell {
         } else if !matches!(self.scene.march, March::Default { .. }) {
             format!("the {} takes all its samples", self.scene.march)
         } else {
-            empty + if self.leaps() { "" } else { ": too little to pay for looking" }
+            let enough = 100.0 * enough_to_leap(&self.scene).unwrap_or(1.0);
+            match self.leaps() {
+                true => empty,
+                false => format!("{empty}: looking would pay from {enough:.0} % on, as {lit}"),
+            }
         };
-        let saturation = if !self.walks() {
+        let saturation = if !walks {
             "all that is sorted is drawn"
         } else if allows(Skip::Saturation) {
             "rays end where 2^-20 of the light is let through"
@@ -76,11 +84,7 @@ impl Shell {
         vec![
             choice("traversal", walk.0, walk.1),
             choice(Skip::EmptySpace.name(), on(self.leaps()), leap),
-            choice(
-                Skip::Saturation.name(),
-                on(self.walks() && allows(Skip::Saturation)),
-                saturation.to_owned(),
-            ),
+            choice(Skip::Saturation.name(), on(walks && allows(Skip::Saturation)), saturation.to_owned()),
             choice(Skip::Levels.name(), on(allows(Skip::Levels)), levels.to_owned()),
             choice(Skip::Kept.name(), on(allows(Skip::Kept)), kept.to_owned()),
             choice(

@@ -15,12 +15,12 @@ use super::constants::{Levels, ViewConstants, constants_of_volume};
 use super::lens::{NEAR, PictureFrame, SeenByLight};
 use super::volume::DeviceVolume;
 use super::walk::{self, RayBuffers, Ways};
-use crate::Result;
 use crate::gpu::{Batch, Buffer, Draw, Gpu, Keeps, Pipeline, PipelineInfo, Sampled, Target, draw, shaders};
 use crate::order::Crossings;
 use crate::progress::{Interrupt, Progress};
 use crate::scene::shading::MOST_LIGHTS;
 use crate::scene::{LightView, March, Scene, Skip};
+use crate::{Error, Result};
 
 /// `LightPicture` of `glsl/include/picture.glsl`: see there for each member.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Pod, Zeroable)]
@@ -242,6 +242,8 @@ impl Shadows {
             if seen.tiles.is_empty() && index > 0 {
                 continue; // the first clears the image
             }
+            // What one light's picture takes tells nothing of another's.
+            self.curves.forget_pace();
             let crossings = Crossings::of_light(ways.faces(), &scene.shell, view, self.side);
             let minified = seen.minified || !scene.skips.allow(Skip::Levels);
             let pipelines = &mut pipelines[usize::from(minified)];
@@ -256,14 +258,13 @@ impl Shadows {
             let mut buffers = vec![(0, &cells_of_left), (1, &tiles), (2, &members), (6, &pictures)];
             let vertices = 0..6 * seen.tiles.len() as u32;
             let mut batches = vec![Batch { pipeline: left, vertices: vertices.clone() }];
-            // Where the device has no room for that, no ray walks, and all are left.
-            let walked = match walk::holds(gpu, &scene.shell, &crossings) {
-                true => {
-                    let cells = Buffer::floats(gpu, "a light's tetrahedra", &seen.cells)?;
-                    Some((cells, RayBuffers::new(gpu, &crossings)?))
-                }
-                false => None,
-            };
+            // Where the device has no room for the crossings, no ray walks, and all are left.
+            let walked = walk::holds_crossings(gpu.most_texels(), &scene.shell, &crossings).then(|| {
+                let cells = Buffer::floats(gpu, "a light's tetrahedra", &seen.cells)?;
+                Ok::<_, Error>((cells, RayBuffers::new(gpu, &crossings)?))
+            });
+            let walked =
+                walked.transpose().map_err(|error| error.with_help("make shading.shadow_size smaller"))?;
             if let Some((cells, rays)) = &walked {
                 buffers.extend([(18, cells), (19, ways.beyond())]);
                 buffers.extend(rays.buffers());

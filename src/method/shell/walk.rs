@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use super::seen::Cell;
 use crate::Result;
 use crate::gpu::{Buffer, Gpu};
 use crate::order::Crossings;
@@ -15,17 +16,15 @@ pub const MOST_SAMPLES: f64 = 500.0;
 /// A ray ends where less is let through: that changes no picture by 1e-6.
 pub const SATURATED: f32 = 1.0 / (1 << 20) as f32;
 
-/// Of `cells` of `glsl/include/walk.glsl`, a tetrahedron.
-const CELL_TEXELS: usize = 9;
-
-/// Whether the device's buffers of texels hold a shell for rays to walk through.
-pub fn holds_cells(gpu: &Gpu, shell: &Shell) -> bool {
-    CELL_TEXELS * shell.topology.tetrahedra.len() <= gpu.most_texels()
+/// Whether buffers of so many texels hold a shell for the rays of so many pixels to walk through.
+pub fn holds(most_texels: usize, shell: &Shell, pixels: usize) -> bool {
+    let cells = size_of::<Cell>() / size_of::<[f32; 4]>() * shell.topology.tetrahedra.len();
+    cells.max(pixels) <= most_texels
 }
 
-/// Whether they hold where rays cross its boundary, too.
-pub fn holds(gpu: &Gpu, shell: &Shell, crossings: &Crossings) -> bool {
-    holds_cells(gpu, shell) && crossings.of_pixels.len().max(crossings.places.len()) <= gpu.most_texels()
+/// Whether they hold where these cross its boundary, too.
+pub fn holds_crossings(most_texels: usize, shell: &Shell, crossings: &Crossings) -> bool {
+    holds(most_texels, shell, crossings.of_pixels.len()) && crossings.places.len() <= most_texels
 }
 
 /// A shell's faces.
@@ -108,5 +107,32 @@ impl RayBuffers {
     /// By the binding that shaders name.
     pub fn buffers(&self) -> [(u32, &Buffer); 2] {
         [(20, &self.of_pixels), (21, &self.places)]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec3;
+
+    use super::*;
+    use crate::mesh::generate::{Generator, Torus};
+    use crate::scene::{Camera, View};
+    use crate::shell::ShellOptions;
+
+    #[test]
+    fn tetrahedra_pixels_and_crossings_must_all_fit() {
+        let mesh = Generator::Torus(Torus { segments: 9, rings: 7, ..Torus::default() }).build().unwrap();
+        let shell = Shell::build(&mesh, &ShellOptions::new(0.2)).unwrap();
+        let cells = 9 * shell.topology.tetrahedra.len();
+        assert!(holds(cells, &shell, 1) && !holds(cells - 1, &shell, 1));
+        assert!(holds(cells + 1, &shell, cells + 1) && !holds(cells, &shell, cells + 1));
+        let eye = DVec3::new(0.0, 2.0, 3.0);
+        let camera = Camera { eye, target: DVec3::ZERO, up: DVec3::Y, fov_y: 0.8, near: 0.1 };
+        let view = View { camera, width: 90, height: 80, depth: false };
+        let mut crossings = Crossings::new(&FaceTable::new(&shell.topology), &shell, &view, None);
+        let most = cells.max(90 * 80).max(crossings.places.len());
+        assert!(holds_crossings(most, &shell, &crossings));
+        crossings.places.resize(most + 1, 0);
+        assert!(!holds_crossings(most, &shell, &crossings));
     }
 }

@@ -1,4 +1,4 @@
-//! Columns of texels along an axis, merged by the opacity equation: exact, and associative, so that four texels give one
+//! Columns of texels along an axis, merged by the opacity equation: exact but for rounding to f32, and associative, so that four texels give one
 //! column whether merged at once or two by two.
 
 use super::coverage::{Coverage, texels_of};
