@@ -82,8 +82,8 @@ impl Shadows {
     /// where the device holds its tetrahedra; where `leaps`, rays do, over what is empty.
     ///
     /// # Errors
-    /// [`Error::Device`](crate::Error::Device) where the pictures are too large for the device,
-    /// [`Error::OutOfMemory`](crate::Error::OutOfMemory), [`Error::Interrupted`](crate::Error::Interrupted).
+    /// [`Error::Device`] where the pictures are too large for the device,
+    /// [`Error::OutOfMemory`], [`Error::Interrupted`].
     pub fn draw(
         gpu: &Arc<Gpu>,
         scene: &Scene,

@@ -34,8 +34,8 @@ pub fn levels(full: &Volume, geometry: &Geometry) -> Vec<Volume> {
     let visibility = Visibility::from_above(full, geometry.edges(0)[2]);
     // One after the other, as each holds as much as the volume again. From outside, u and v are seen from either side, w from above.
     let seen = [
-        beams_along(full, geometry, 0, Some(&visibility), Passage::from_both),
-        beams_along(full, geometry, 1, Some(&visibility), Passage::from_both),
+        beams_along(full, geometry, 0, Some(&visibility), Passage::of_both_sides),
+        beams_along(full, geometry, 1, Some(&visibility), Passage::of_both_sides),
         beams_along(full, geometry, 2, None, |passage: Passage| passage),
     ];
     let merged = |level: usize| {

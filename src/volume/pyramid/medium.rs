@@ -113,7 +113,7 @@ impl<const SIDES: usize> Passage<SIDES> {
 
 impl Passage<2> {
     /// Seen from both sides as much.
-    pub fn from_both(self) -> Passage {
+    pub fn of_both_sides(self) -> Passage {
         let [below, above] = self.light;
         let light = [std::array::from_fn(|c| 0.5 * (below[c] + above[c]))];
         Passage { depth: self.depth, opacity: self.opacity, light }
@@ -204,9 +204,9 @@ mod tests {
     }
 
     #[test]
-    fn from_both_sides_is_the_mean_of_each() {
+    fn the_mean_of_both_sides_is_that_of_each() {
         let both = Passage { depth: 1.0, opacity: opacity(1.0), light: [[0.5, 0.0, 1.0], [0.25, 0.0, 0.0]] }
-            .from_both();
+            .of_both_sides();
         assert_eq!((both.depth, both.light), (1.0, [[0.375, 0.0, 0.5]]));
     }
 }
