@@ -32,8 +32,8 @@ vec3 emitted(vec4 texel, float amount) {
 }
 
 #ifdef LIT_SPARSE
-// On from sample `i` to the next in which something is, at depth `z`; where there is none, past the last, and nothing. To light a texel costs several times what it costs to
-// read one, and of eight pixels that run at once each finds its own before all are lit.
+// On from sample `i` to the next in which something is, at depth `z`; where there is none, past the last, and nothing. To light a
+// texel costs several times what it costs to read one, and of eight pixels that run at once each finds its own before all are lit.
 vec4 next_seen(Path path, Steps steps, inout uint i, out float z, inout uint passes) {
     vec4 texel = vec4(0.0);
     z = 0.0;

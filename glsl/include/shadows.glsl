@@ -13,8 +13,8 @@ float growths_done(vec4 from, vec4 to, float depth) {
     return dot(clamp((depth - from) / max(to - from, 1e-7), 0.0, 1.0), vec4(1.0));
 }
 
-// Of the medium alone, along the ray of the pixel whose centre is there, in parts of the image's sides. Not texelFetch, for which lavapipe 22.3 looks up
-// the level of detail of each pixel by itself: of its instructions that is more than half.
+// Of the medium alone, along the ray of the pixel whose centre is there, in parts of the image's sides. Not texelFetch, for which
+// lavapipe 22.3 looks up the level of detail of each pixel by itself: of its instructions that is more than half.
 float transmittance_until(vec2 at, float depth) {
     vec4 whole = textureLod(curves, vec3(at, 0.0), 0.0);
     // Not silently: what is lit by this is not finite, and the host sees that.

@@ -1,4 +1,5 @@
-//! Whether a device blends levels of detail as exactly as f32 does.
+//! Whether a device blends levels of detail as exactly as f32 does. Vulkan lets it round the weight, and tells by
+//! `VkPhysicalDeviceLimits::mipmapPrecisionBits` how many bits are left at least, not how many are: so it is measured.
 
 use std::sync::Arc;
 

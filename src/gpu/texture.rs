@@ -18,6 +18,7 @@ use crate::{Error, Result};
 pub struct Texture3d {
     pub(super) image: DeviceImage,
     pub(super) sampler: vk::Sampler,
+    between: vk::SamplerMipmapMode,
     pub(super) gpu: Arc<Gpu>,
 }
 
@@ -46,9 +47,9 @@ const FILTERED: vk::FormatFeatureFlags = vk::FormatFeatureFlags::from_raw(
 /// A mip level: its size, and its texels as `T`, u fastest.
 type Level<'a, T> = ([u32; 3], &'a [T]);
 
-/// What is read between two levels of detail: their mean, where the device knows that well enough.
-fn between_levels(gpu: &Arc<Gpu>) -> Result<vk::SamplerMipmapMode> {
-    Ok(match gpu.blends_levels()? {
+/// What is read between two of so many levels of detail: their mean, where the device knows that well enough.
+fn between_levels(gpu: &Arc<Gpu>, levels: usize) -> Result<vk::SamplerMipmapMode> {
+    Ok(match levels > 1 && gpu.blends_levels()? {
         true => vk::SamplerMipmapMode::LINEAR,
         false => vk::SamplerMipmapMode::NEAREST,
     })
@@ -65,7 +66,7 @@ impl Texture3d {
     pub fn upload(gpu: &Arc<Gpu>, name: &'static str, pyramid: &Pyramid) -> Result<Self> {
         let levels: Vec<Level<'_, _>> =
             pyramid.levels.iter().map(|level| (level.size, level.texels.as_slice())).collect();
-        Self::upload_colours(gpu, name, &levels, between_levels(gpu)?)
+        Self::upload_colours(gpu, name, &levels, between_levels(gpu, levels.len())?)
     }
 
     /// The same for directions.
@@ -78,7 +79,7 @@ impl Texture3d {
     pub fn upload_directions(gpu: &Arc<Gpu>, name: &'static str, directions: &Directions) -> Result<Self> {
         let levels: Vec<Level<'_, _>> =
             directions.levels.iter().map(|level| (level.size, level.texels.as_slice())).collect();
-        Self::upload_colours(gpu, name, &levels, between_levels(gpu)?)
+        Self::upload_colours(gpu, name, &levels, between_levels(gpu, levels.len())?)
     }
 
     /// Uploads distances, read as parts of 255, of the box that a sample is in.
@@ -118,7 +119,7 @@ impl Texture3d {
         Self::check_sides(gpu, name, levels[0].0)?;
         let zero = vk::ComponentSwizzle::ZERO;
         let channels = vk::ComponentMapping { r: zero, g: zero, b: zero, a: vk::ComponentSwizzle::R };
-        let filters = (vk::Filter::LINEAR, between_levels(gpu)?);
+        let filters = (vk::Filter::LINEAR, between_levels(gpu, levels.len())?);
         Self::upload_levels(gpu, name, (format, channels), filters, &levels, |texels| {
             Cow::Owned(texels.iter().flat_map(|texel| texel[3].to_ne_bytes()).collect())
         })
@@ -205,7 +206,13 @@ impl Texture3d {
         // SAFETY: a plain sampler of a device that outlives it.
         let sampler = unsafe { gpu.raw.create_sampler(&sampler_info, None) }
             .map_err(|error| vulkan_error("creating the volume's sampler", error))?;
-        Ok(Self { image, sampler, gpu: gpu.clone() })
+        Ok(Self { image, sampler, between, gpu: gpu.clone() })
+    }
+
+    /// Whether what is read between two levels of detail is their mean, as exact as f32: see [`Gpu::blends_levels`]. Else it is the
+    /// nearer one.
+    pub fn blends_levels(&self) -> bool {
+        self.between == vk::SamplerMipmapMode::LINEAR
     }
 
     fn check_sides(gpu: &Gpu, name: &str, size: [u32; 3]) -> Result<()> {

@@ -109,8 +109,6 @@ pub(super) struct CanvasKind {
     /// Whether anything is resolved pixel by pixel.
     cycles: bool,
     walks: bool,
-    /// Whether other levels of detail than the first are read.
-    minified: bool,
     /// Whether there are squares in which all is magnified, and others.
     partly_magnified: bool,
     /// What is compiled into the shaders: what the scene has, and what is asked for.
@@ -187,7 +185,6 @@ impl Shell {
                 Sight::Walked(crossings) => crossings.overlapping > 0,
             },
             walks: matches!(sight, Sight::Walked(_)),
-            minified,
             partly_magnified: match sight {
                 Sight::Walked(crossings) if skips.allow(Skip::Levels) => {
                     seen.is_worth_parting(crossings, view)
@@ -230,7 +227,7 @@ impl Shell {
             uniform_buffers: &uniform_buffers,
             texel_buffers: &texel_buffers,
             textures: &textures,
-            minified: kind.minified,
+            minified: kind.constants[1] != Levels::First as u32,
             push_constant_bytes: size_of::<ViewConstants>() as u32,
             keeps: Keeps::Blend,
         };

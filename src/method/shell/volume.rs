@@ -19,8 +19,6 @@ pub struct DeviceVolume {
     /// Where enough of it is empty.
     proximity: Option<Texture3d>,
     emptiness: f64,
-    /// Whether the device blends levels of detail as well as a shader does.
-    blends_levels: bool,
 }
 
 impl DeviceVolume {
@@ -43,8 +41,7 @@ impl DeviceVolume {
                 proximity = Some(Texture3d::upload_proximity(gpu, "the volume's distances", &distances)?);
             }
         }
-        let blends_levels = gpu.blends_levels()?;
-        Ok(Self { texture, alpha: OnceCell::new(), proximity, emptiness, blends_levels })
+        Ok(Self { texture, alpha: OnceCell::new(), proximity, emptiness })
     }
 
     /// Whether there are distances by which rays can leap.
@@ -59,7 +56,7 @@ impl DeviceVolume {
 
     /// Of its levels of detail, what shaders read.
     pub(super) fn levels(&self, minified: bool) -> Levels {
-        match (minified, self.blends_levels) {
+        match (minified, self.texture.blends_levels()) {
             (false, _) => Levels::First,
             (true, false) => Levels::BlendedByShader,
             (true, true) => Levels::BlendedByDevice,

@@ -10,7 +10,7 @@ use std::path::Path;
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::pyramid::coverage::{VolumeCoverage, texels_of};
+use super::pyramid::coverage::{VolumeCoverage, index_of, texels_of};
 use super::{Volume, ktx2_file, texel_at};
 use crate::{Error, Result};
 
@@ -96,13 +96,12 @@ impl Directions {
 /// The next level: means over the finer texels that each coarse one covers.
 fn halved(finer: &DirectionLevel) -> DirectionLevel {
     let size = finer.size.map(|n| (n / 2).max(1));
-    let [width, height] = [finer.size[0] as usize, finer.size[1] as usize];
     let coverage = VolumeCoverage::new(finer.size, size);
     let texel = |at| {
         let mut sum = [0.0; 4];
         let mut parts = 0.0;
-        for ([u, v, w], part) in coverage.of(at) {
-            let texel = finer.texels[(w as usize * height + v as usize) * width + u as usize];
+        for (place, part) in coverage.of(at) {
+            let texel = finer.texels[index_of(finer.size, place)];
             for (sum, value) in sum.iter_mut().zip(texel) {
                 *sum += part * f64::from(value);
             }

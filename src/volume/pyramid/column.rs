@@ -1,7 +1,7 @@
 //! Columns of texels along an axis, merged by the opacity equation: exact but for rounding to f32, and associative, so that four texels give one
 //! column whether merged at once or two by two.
 
-use super::coverage::{Coverage, texels_of};
+use super::coverage::{Coverage, index_of, stored, texels_of};
 use super::medium::Passage;
 use crate::volume::Volume;
 
@@ -52,8 +52,6 @@ impl<const SIDES: usize> Columns<SIDES> {
                 through(place, part)
             });
             let whole = passages.reduce(Passage::under).unwrap_or(Passage::NOTHING);
-            // Only a glow near the end of f32 would overflow.
-            let stored = |colour: f64| colour.min(f64::from(f32::MAX)) as f32;
             Piece { depth: whole.depth, straight: whole.straight().map(|colour| colour.map(stored)) }
         });
         Self { size, axis, pieces }
@@ -74,8 +72,6 @@ impl<const SIDES: usize> Columns<SIDES> {
     }
 
     fn piece(&self, at: [u32; 3]) -> &Piece<SIDES> {
-        let [u, v, w] = at.map(|i| i as usize);
-        let [width, height] = [self.size[0] as usize, self.size[1] as usize];
-        &self.pieces[(w * height + v) * width + u]
+        &self.pieces[index_of(self.size, at)]
     }
 }

@@ -71,9 +71,18 @@ impl VolumeCoverage {
 
 /// A volume whose texels are computed in f64 and independently, so that it does not depend on the threads.
 pub fn volume_of(size: [u32; 3], quantity: Quantity, texel: impl Fn([u32; 3]) -> [f64; 4] + Sync) -> Volume {
-    // Only a glow near the end of f32, gathered from several layers, would overflow.
-    let stored = |at| texel(at).map(|value| value.min(f64::from(f32::MAX)) as f32);
-    Volume { size, texels: texels_of(size, [0.0; 4], stored), quantity }
+    Volume { size, texels: texels_of(size, [0.0; 4], |at| texel(at).map(stored)), quantity }
+}
+
+/// Rounded to f32. Only a glow near its end, gathered from several layers, would overflow.
+pub fn stored(value: f64) -> f32 {
+    value.min(f64::from(f32::MAX)) as f32
+}
+
+/// Where a texel is in a list of those of a volume.
+pub fn index_of(size: [u32; 3], [u, v, w]: [u32; 3]) -> usize {
+    let [width, height, u, v, w] = [size[0], size[1], u, v, w].map(|i| i as usize);
+    (w * height + v) * width + u
 }
 
 /// Something for each texel of a volume, computed independently; `filler` is nothing of it.

@@ -19,7 +19,7 @@
 //!   side in one. So transmittances of layers average at [`REACH`] times the texel's length.
 
 use super::column::Columns;
-use super::coverage::{Coverage, texels_of, volume_of};
+use super::coverage::{Coverage, index_of, texels_of, volume_of};
 use super::geometry::Geometry;
 use super::medium::Passage;
 use super::visibility::Visibility;
@@ -42,7 +42,7 @@ pub fn levels(full: &Volume, geometry: &Geometry) -> Vec<Volume> {
         let size = geometry.sizes[level];
         let beams = geometry.beams(level);
         volume_of(size, full.quantity, |at| {
-            let index = index(size, at);
+            let index = index_of(size, at);
             let passages = [0, 1, 2].map(|axis| (beams[axis], seen[axis][level - 1][index]));
             Passage::mean(passages.into_iter()).texel(geometry.beam_length(level), full.quantity)
         })
@@ -111,12 +111,6 @@ fn bundles<const SIDES: usize>(
         let mean = Passage::mean(passages.collect::<Vec<_>>().into_iter());
         seen(mean).stretched(stretch)
     })
-}
-
-/// Where the passage of a texel is stored.
-fn index(size: [u32; 3], [u, v, w]: [u32; 3]) -> usize {
-    let [width, height, u, v, w] = [size[0], size[1], u, v, w].map(|i| i as usize);
-    (w * height + v) * width + u
 }
 
 #[cfg(test)]

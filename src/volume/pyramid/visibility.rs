@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::coverage::{Coverage, texels_of, texels_per_coarse};
+use super::coverage::{Coverage, index_of, texels_of, texels_per_coarse};
 use super::medium::depth;
 use crate::volume::Volume;
 
@@ -36,9 +36,8 @@ impl Visibility {
     }
 
     /// Of one texel.
-    pub fn at(&self, [u, v, w]: [u32; 3]) -> f64 {
-        let [u, v, w] = [u, v, w].map(|i| i as usize);
-        f64::from(self.parts[(w * self.size[1] as usize + v) * self.size[0] as usize + u])
+    pub fn at(&self, texel: [u32; 3]) -> f64 {
+        f64::from(self.parts[index_of(self.size, texel)])
     }
 
     /// The means over the pieces of columns along an axis that is cut into `coarse`.
