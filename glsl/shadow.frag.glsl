@@ -1,6 +1,6 @@
 #version 450
 #extension GL_ARB_shading_language_include : require
-// switches: SPARSE SOLIDS
+// switches: SPARSE EVEN(SPARSE) SOLIDS
 // A pixel of a light's picture: how the medium dims the light along its ray, which walks as the eye's do. What is too much for that is left
 // to shadow_left.frag.glsl.
 
@@ -36,14 +36,18 @@ void main() {
         Stretch stretch = go_on(walker, ray.along, ray.farthest, passes);
         Steps steps = stretch.steps;
         // It has two ends: see `march_midpoints`.
-        for (uint i = stretch.first; i < steps.count;) {
-            float of_step = extinction(fetch(stretch.path, middle(steps, i))) * max(steps.size * per_depth, LEAST);
-            dim(steps.begin + float(i) * steps.size, steps.size, of_step);
+        for (uint i = stretch.first; i < steps.count || even_waits();) {
+            Part part = next_part(steps, i);
+            vec4 texel = fetch(stretch.path, part.middle);
+#ifdef EVEN
+            if (part.is_even) texel = view.even;
+#endif
+            dim(part.begin, part.size, extinction(texel) * max(part.size * per_depth, LEAST));
             passes += PASSES_A_SAMPLE;
-            i = seek(stretch.path, steps, i + 1, passes);
+            i = seek(stretch.path, steps, i, passes);
             if (i >= steps.count) break;
         }
-        if (walker.is_done || is_dark()) break;
+        if ((walker.is_done && !even_waits()) || is_dark()) break;
     }
     if (is_left || walker.strays || passes >= MOST_PASSES) discard;
     write_curve();

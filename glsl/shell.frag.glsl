@@ -1,6 +1,6 @@
 #version 450
 #extension GL_ARB_shading_language_include : require
-// switches: DEPTH SOLIDS SPARSE LIT SHADOWS(LIT)
+// switches: DEPTH SOLIDS SPARSE EVEN(SPARSE) LIT SHADOWS(LIT)
 // Marches the segment of one ray in one tetrahedron.
 // Dufort, Leblanc, Poulin 2005, sections 4.2 and 4.3, with one change: entry and exit are not interpolated over the
 // front faces but found per pixel from the four planes, so that the rasteriser's snapping of vertices does not move them.

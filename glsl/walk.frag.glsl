@@ -1,9 +1,10 @@
 #version 450
 #extension GL_ARB_shading_language_include : require
-// switches: DEPTH SOLIDS SPARSE LIT SHADOWS(LIT)
+// switches: DEPTH SOLIDS SPARSE EVEN(SPARSE) LIT SHADOWS(LIT)
 // Walks the ray of each pixel through the shell, front to back, from every place where it enters. A pixel that is too much for
 // that is left to the host: it becomes infinite.
 
+#define WALKS
 #include "shell.glsl"
 #include "medium.glsl"
 #include "ray.glsl"
@@ -34,15 +35,16 @@ void main() {
     Light light = Light(Gathered(vec4(0.0), vec4(0.0)), 0.0);
     uint passes = 0;
     Walker walker = walker_at(next, last, is_begun, ray, passes);
+    Stretch stretch = nothing_passed();
     while (!walker.strays && passes < MOST_PASSES) {
-        Stretch stretch = go_on(walker, ray, farthest, passes);
-        if (stretch.first < stretch.steps.count) {
+        if (stretch.first >= stretch.steps.count) stretch = go_on(walker, ray, farthest, passes);
+        if (stretch.first < stretch.steps.count || even_waits()) {
 #ifdef LIT
             enter(stretch.cell, ray);
 #endif
             march_midpoints(stretch.path, stretch.steps, stretch.first, per_depth, light, passes);
         }
-        if (walker.is_done || transmittance(light.gathered) <= SATURATED) break;
+        if ((walker.is_done && stretch.first >= stretch.steps.count && !even_waits()) || transmittance(light.gathered) <= SATURATED) break;
     }
     bool is_left = walker.strays || passes >= MOST_PASSES;
     out_rgba = is_left ? vec4(uintBitsToFloat(0x7f800000u)) : light.gathered.rgba;

@@ -177,7 +177,8 @@ fn nothing_is_compiled_in_that_a_scene_does_not_need() {
 
 #[test]
 fn shell_structs_agree() {
-    let constants = host!(ViewConstants: centre, pixel, near, texels, last_level, lod_scale, per_opacity_distance, step, samples);
+    let constants = host!(ViewConstants: centre, pixel, near, texels, last_level, lod_scale, per_opacity_distance, step, samples, even,
+        even_steps);
     // The shell's vertex shader reads no constants, but the fragment shaders do.
     let others = [
         shaders::SHADOW_FRAG.with(&[]),

@@ -80,7 +80,7 @@ uint sample_count(Path path, float entry, float exit) {
 }
 
 #ifdef SPARSE
-layout(set = 0, binding = 22) uniform sampler3D proximity; // of src/volume/proximity.rs, in parts of 255
+layout(set = 0, binding = 22) uniform sampler3D proximity; // of src/volume/proximity.rs, in parts of 255: to what is not empty or even
 #endif
 
 // A segment in equal steps.
@@ -128,7 +128,37 @@ float middle(Steps steps, uint i) {
     return steps.begin + (float(i) + 0.5) * steps.size;
 }
 
-// The first step from `i` on in which something may be seen: those that are left out see nothing. Counts passes through its loop.
+#ifdef EVEN
+// What of the ray was passed, but is not yet sampled, since it goes on: the texture there is `view.even`.
+struct Even {
+    float begin; // depths
+    float end;
+    uint steps;
+};
+
+Even even = Even(0.0, 0.0, 0);
+#endif
+
+// Whether there is such a stretch.
+bool even_waits() {
+#ifdef EVEN
+    return even.steps > 0;
+#else
+    return false;
+#endif
+}
+
+// Whether no more may be added to it.
+bool even_is_full() {
+#ifdef EVEN
+    return even.steps >= view.even_steps;
+#else
+    return false;
+#endif
+}
+
+// The first step from `i` on in which something may be seen: those that are left out see nothing, or, where much of the volume is one
+// even medium, that. Counts passes through its loop.
 uint seek(Path path, Steps steps, uint i, inout uint passes) {
 #ifdef SPARSE
     // It has two ends: see `march_midpoints`.
@@ -137,11 +167,38 @@ uint seek(Path path, Steps steps, uint i, inout uint passes) {
         float distance = round(255.0 * textureLod(proximity, point, max(steps.level, 0.0)).x);
         passes++;
         bool is_near = distance == 0.0 || steps.level < 0.0;
-        i += is_near ? 0 : 1 + uint((distance - 1.0) * steps.per_texel);
-        if (is_near || i >= steps.count) break;
+        uint leap = is_near ? 0 : 1 + uint((distance - 1.0) * steps.per_texel);
+#ifdef EVEN
+        leap = min(leap, min(steps.count - i, view.even_steps - even.steps));
+        if (even.steps == 0) even.begin = steps.begin + float(i) * steps.size;
+        if (leap > 0) even.end = steps.begin + float(i + leap) * steps.size;
+        even.steps += leap;
+#endif
+        i += leap;
+        if (is_near || i >= steps.count || even_is_full()) break;
     }
 #endif
     return i;
+}
+
+// What is sampled at once: a step, or all of an even stretch.
+struct Part {
+    float begin; // depths
+    float middle;
+    float size;
+    bool is_even;
+};
+
+// The next one, which is step `i` where nothing else waits.
+Part next_part(Steps steps, inout uint i) {
+    Part part = Part(steps.begin + float(i) * steps.size, middle(steps, i), steps.size, false);
+#ifdef EVEN
+    float size = even.end - even.begin;
+    if (even_waits()) part = Part(even.begin, even.begin + 0.5 * size, size, true);
+    even.steps = 0;
+#endif
+    i += part.is_even ? 0 : 1;
+    return part;
 }
 
 // Optical depth of a path of one opacity distance through this texel.

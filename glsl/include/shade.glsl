@@ -44,10 +44,9 @@ void add_light(uint light_index, Spot spot, inout vec3 scattered, inout vec3 mir
     mirrored += light * (lighting.specular * spot.agreement * lobe);
 }
 
-// A texel as it is lit: its alpha, and the colour that it sends to the eye, premultiplied as before.
-vec4 lit(vec4 texel, Path path, float depth) {
+// A texel as it is lit, with its weighted direction: its alpha, and the colour that it sends to the eye, premultiplied as before.
+vec4 lit(vec4 texel, vec4 weighted, float depth) {
     if (!(texel.a > LEAST)) return texel;
-    vec4 weighted = fetch_from(directions, path, depth);
     vec3 direction = (frame_at_eye + depth * frame_from_depth) * weighted.xyz;
     float size = length(direction);
     bool has_direction = weighted.w > LEAST && size > LEAST;
@@ -74,5 +73,5 @@ vec4 lit(vec4 texel, Path path, float depth) {
 
 // As `fetch`, lit.
 vec4 radiant(Path path, float depth) {
-    return lit(fetch(path, depth), path, depth);
+    return lit(fetch(path, depth), fetch_from(directions, path, depth), depth);
 }

@@ -13,6 +13,8 @@ layout(push_constant, std430) uniform View {
     float per_opacity_distance; // 1 / opacity_distance
     float step;          // `default` plan: texels a sample
     uint samples;        // `paper` plan: samples a tetrahedron
+    vec4 even;          // the texel that much of the volume is like, where that is something
+    uint even_steps;    // how many steps in it are one, at most
 } view;
 
 // A tetrahedron as seen from the eye.

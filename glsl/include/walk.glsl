@@ -205,7 +205,7 @@ Walker walker_at(int next, int last, bool is_begun, vec3 ray, inout uint passes)
     return walker;
 }
 
-// On to the next tetrahedron in which something may be seen, before `farthest`. Where several pixels run at once, all of them wait here
+// On to the next tetrahedron in which something may be seen, before `farthest`, or to the end of what is even. Where several pixels run at once, all of them wait here
 // for one another, and march together then.
 Stretch go_on(inout Walker walker, vec3 ray, float farthest, inout uint passes) {
     Stretch stretch = nothing_passed();
@@ -215,6 +215,7 @@ Stretch go_on(inout Walker walker, vec3 ray, float farthest, inout uint passes) 
         stretch.steps.count = 0;
         bool is_entering = walker.place == NOWHERE;
         if (is_entering) {
+            if (even_waits()) break; // it ends here
             walker.is_done = walker.next == walker.last;
             if (walker.is_done) break;
             uint crossing = texelFetch(crossings, walker.next++).x;
@@ -256,7 +257,7 @@ Stretch go_on(inout Walker walker, vec3 ray, float farthest, inout uint passes) 
                 walker.strays = walker.strays || !leaves(walker.from, exit, leave & ~LEAVES, ray);
             }
         }
-        if (stretch.first < stretch.steps.count || walker.is_done || walker.strays) break;
+        if (stretch.first < stretch.steps.count || even_is_full() || walker.is_done || walker.strays) break;
     }
     return stretch;
 }

@@ -8,6 +8,8 @@ use serde::{Deserialize, Serialize};
 pub enum Skip {
     /// Samples where nothing of the volume is.
     EmptySpace,
+    /// Samples where the volume is the same all around.
+    EvenSpace,
     /// What lies behind where next to nothing is let through.
     Saturation,
     /// Levels of detail that nothing is far enough away for.
@@ -18,12 +20,14 @@ pub enum Skip {
 
 impl Skip {
     /// All of them.
-    pub const ALL: [Self; 4] = [Self::EmptySpace, Self::Saturation, Self::Levels, Self::Kept];
+    pub const ALL: [Self; 5] =
+        [Self::EmptySpace, Self::EvenSpace, Self::Saturation, Self::Levels, Self::Kept];
 
     /// As scene files and the command line have it.
     pub fn name(self) -> &'static str {
         match self {
             Self::EmptySpace => "empty-space",
+            Self::EvenSpace => "even-space",
             Self::Saturation => "saturation",
             Self::Levels => "levels",
             Self::Kept => "kept",
@@ -34,6 +38,7 @@ impl Skip {
     pub fn summary(self) -> &'static str {
         match self {
             Self::EmptySpace => "rays leap over places where nothing of the volume is",
+            Self::EvenSpace => "where the volume is one medium, the same all around, several steps are one",
             Self::Saturation => "rays that walk end where 2^-20 of the light is let through",
             Self::Levels => "where all is magnified, no coarser level of detail is compiled in",
             Self::Kept => {

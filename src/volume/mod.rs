@@ -26,7 +26,7 @@ pub use haze::Haze;
 pub use interpretation::Interpretation;
 pub use ktx2_file::{write_raw, write_volume};
 pub use loss::Loss;
-pub use proximity::{Proximity, ProximityLevel};
+pub use proximity::{Proximity, ProximityLevel, commonest, part_like};
 pub use pyramid::Filter;
 pub use raw::{AlphaMode, ChannelRange, RawVolume, VolumeInfo};
 pub use sample::Sample;

@@ -1,14 +1,18 @@
-//! How far the nearest texel that is seen is from each place in a texture: so far a ray need not look. D. Cohen, Z. Sheffer,
-//! *Proximity clouds, an acceleration technique for 3D grid traversal*, 1994; distances are those of the greatest axis.
+//! How far the nearest texel that is unlike most others is from each place in a texture: so far a ray need not look. D. Cohen, Z.
+//! Sheffer, *Proximity clouds, an acceleration technique for 3D grid traversal*, 1994; distances are those of the greatest axis. What
+//! most are like may be nothing, or a medium that is the same everywhere (J. Freund, K. Sloan, *Accelerated volume rendering using
+//! homogeneous region encoding*, 1997).
+
+use std::collections::HashMap;
 
 use rayon::prelude::*;
 
-use super::{Pyramid, Volume};
+use super::{Directions, Pyramid, Quantity, Volume};
 
 /// No distance is more, in texels. Longer leaps save little: each spares but one more look.
 const FARTHEST: u8 = 16;
 
-/// Distances of places to what is seen, for each level of a [`Pyramid`].
+/// Distances of places to what is unlike the rest, for each level of a [`Pyramid`].
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Proximity {
     /// From the level of the full volume on.
@@ -20,9 +24,9 @@ pub struct Proximity {
 pub struct ProximityLevel {
     /// As that of the level: texels along u, v, w.
     pub size: [u32; 3],
-    /// Of each texel's box, u fastest, then v, then w: 0 where a sample in it may see something, at this level, the next finer or the
-    /// next coarser; else the distance, in texels of this level along the axis where it is greatest, of the nearest box where one may.
-    /// u and v repeat. At most 16, also where there is none.
+    /// Of each texel's box, u fastest, then v, then w: 0 where a sample in it may read a texel unlike the rest, at this level, the next
+    /// finer or the next coarser; else the distance, in texels of this level along the axis where it is greatest, of the nearest box
+    /// where one may. u and v repeat. At most 16, also where there is none.
     pub distances: Vec<u8>,
 }
 
@@ -30,16 +34,20 @@ pub struct ProximityLevel {
 type Boxes = Vec<u8>;
 
 impl Proximity {
-    /// Of all levels of `pyramid`.
-    pub fn new(pyramid: &Pyramid) -> Self {
-        let seen: Vec<Boxes> = pyramid.levels.iter().map(seen).collect();
+    /// Of all levels of `pyramid`, to the texels that are unlike `rest`, or that have a direction.
+    pub fn new(pyramid: &Pyramid, directions: Option<&Directions>, rest: [f32; 4]) -> Self {
+        let level_of_directions =
+            |level: usize| directions.map(|directions| &*directions.levels[level].texels);
+        let levels = pyramid.levels.iter().enumerate();
+        let unlike: Vec<Boxes> =
+            levels.map(|(level, volume)| unlike(volume, level_of_directions(level), rest)).collect();
         let levels = 0..pyramid.levels.len();
         let levels = levels.map(|level| {
             let size = pyramid.levels[level].size;
-            let mut near = vec![0; seen[level].len()];
+            let mut near = vec![0; unlike[level].len()];
             let read = level.saturating_sub(1)..pyramid.levels.len().min(level + 2);
-            for (seen, of) in seen[read.clone()].iter().zip(&pyramid.levels[read]) {
-                let within = reached(seen, of.size, size);
+            for (unlike, of) in unlike[read.clone()].iter().zip(&pyramid.levels[read]) {
+                let within = reached(unlike, of.size, size);
                 near.iter_mut().zip(within).for_each(|(near, within)| *near |= within);
             }
             ProximityLevel { size, distances: distances(&near, size) }
@@ -47,16 +55,47 @@ impl Proximity {
         Self { levels: levels.collect() }
     }
 
-    /// The part, 0..1, of the full volume's boxes in which nothing is seen.
-    pub fn emptiness(&self) -> f64 {
+    /// The part, 0..1, of the full volume's boxes in which all is like the rest.
+    pub fn part(&self) -> f64 {
         let distances = &self.levels[0].distances;
         distances.iter().filter(|distance| **distance > 0).count() as f64 / distances.len() as f64
     }
 }
 
-/// Where alpha is more than 0.
-fn seen(level: &Volume) -> Boxes {
-    level.texels.par_iter().map(|texel| u8::from(texel[3] > 0.0)).collect()
+/// Whether two texels are the same but for the rounding of means: levels of detail are those of the ones before, by f64, each rounded
+/// to f32, and there are at most nine.
+fn is_like(texel: &[f32; 4], rest: &[f32; 4]) -> bool {
+    texel.iter().zip(rest).all(|(a, b)| (a - b).abs() <= 9.0 * f32::EPSILON * b)
+}
+
+/// The part, 0..1, of a volume's texels that are like `rest`.
+pub fn part_like(volume: &Volume, rest: [f32; 4]) -> f64 {
+    let like = volume.texels.par_iter().filter(|texel| is_like(texel, &rest)).count();
+    like as f64 / volume.texels.len() as f64
+}
+
+/// The texel that most others are like, of those that are seen and let something through: of all, or of some thousands that lie as far
+/// apart; `None` where there is none.
+pub fn commonest(volume: &Volume) -> Option<[f32; 4]> {
+    let stride = (volume.texels.len() / 4096).max(1) | 1;
+    let mut counts = HashMap::new();
+    let lets_through = |alpha: f32| volume.quantity == Quantity::Extinction || alpha < 1.0;
+    let some = volume.texels.iter().step_by(stride).filter(|texel| texel[3] > 0.0 && lets_through(texel[3]));
+    some.for_each(|texel| *counts.entry(texel.map(f32::to_bits)).or_insert(0) += 1);
+    let most = counts.into_iter().max_by_key(|&(texel, count)| (count, texel));
+    most.map(|(texel, _)| texel.map(f32::from_bits))
+}
+
+/// Where a texel is unlike `rest`, or has a direction.
+fn unlike(level: &Volume, directions: Option<&[[f32; 4]]>, rest: [f32; 4]) -> Boxes {
+    let mut unlike: Boxes = level.texels.par_iter().map(|texel| u8::from(!is_like(texel, &rest))).collect();
+    if let Some(directions) = directions {
+        unlike
+            .par_iter_mut()
+            .zip(directions)
+            .for_each(|(unlike, direction)| *unlike |= u8::from(direction[3] != 0.0));
+    }
+    unlike
 }
 
 /// For boxes of a grid of `size`, whether linear interpolation in them reads any of the texels that are true, of a level of another
@@ -197,7 +236,7 @@ mod tests {
             let mut seen = size.map(|side| random.random_range(0..side));
             seen[2] = if last { size[2] - 1 } else { seen[2] };
             let pyramid = pyramid(size, |place| place == seen);
-            let proximity = Proximity::new(&pyramid);
+            let proximity = Proximity::new(&pyramid, None, [0.0; 4]);
             let mut leaps = 0;
             for _ in 0..10_000 {
                 let level = random.random_range(0..pyramid.levels.len());
@@ -231,7 +270,7 @@ mod tests {
     #[test]
     fn distances_are_those_of_the_greatest_axis_and_u_and_v_repeat() {
         let full = pyramid([40, 40, 40], |place| place == [1, 20, 30]);
-        let level = &Proximity::new(&full).levels[0];
+        let level = &Proximity::new(&full, None, [0.0; 4]).levels[0];
         let at = |u: usize, v: usize, w: usize| level.distances[(w * 40 + v) * 40 + u];
         // The texel is read in the boxes beside its own, and half a coarser texel farther: one box more.
         assert_eq!(at(1, 20, 30), 0);
@@ -246,7 +285,7 @@ mod tests {
 
     #[test]
     fn a_dense_volume_is_near_everywhere() {
-        assert_eq!(Proximity::new(&pyramid([8, 8, 8], |_| true)).emptiness(), 0.0);
-        assert_eq!(Proximity::new(&pyramid([8, 8, 8], |_| false)).emptiness(), 1.0);
+        assert_eq!(Proximity::new(&pyramid([8, 8, 8], |_| true), None, [0.0; 4]).part(), 0.0);
+        assert_eq!(Proximity::new(&pyramid([8, 8, 8], |_| false), None, [0.0; 4]).part(), 1.0);
     }
 }

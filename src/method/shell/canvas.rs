@@ -160,7 +160,6 @@ impl Shell {
         let switches = [
             ("DEPTH", view.depth),
             ("SOLIDS", self.solids.is_some()),
-            ("SPARSE", self.leaps()),
             ("LIT", self.lit.is_some()),
             ("SHADOWS", self.shadows.is_some()),
         ];
@@ -191,7 +190,11 @@ impl Shell {
                 }
                 _ => false,
             },
-            switches: switches.into_iter().filter_map(|(name, is_on)| is_on.then_some(name)).collect(),
+            switches: switches
+                .into_iter()
+                .filter_map(|(name, is_on)| is_on.then_some(name))
+                .chain(self.volume.switches().iter().copied())
+                .collect(),
             constants,
         }
     }

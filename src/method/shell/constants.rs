@@ -2,6 +2,7 @@
 
 use bytemuck::{Pod, Zeroable};
 
+use crate::scene::shading::{Light, Source};
 use crate::scene::{March, Scene, View};
 use crate::volume::{Pyramid, Quantity};
 
@@ -19,6 +20,8 @@ pub struct ViewConstants {
     pub per_opacity_distance: f32,
     pub step: f32,
     pub samples: u32,
+    pub even: [f32; 4],
+    pub even_steps: u32,
 }
 
 /// Passes through loops that a ray makes in one tetrahedron at most: a bound of `sample_count` and `march_exactly` in
@@ -61,35 +64,50 @@ pub(super) fn constants_of_volume(march: March, levels: Levels, volume: &Pyramid
     [plan(march), levels as u32, u32::from(is_extinction)]
 }
 
+/// How many steps through a medium that is the same everywhere are one, at most: whether anything more is let through must be asked
+/// now and then.
+const EVEN_STEPS: u32 = 64;
+
+/// The same where the light differs along them: by a shadow, or by the distance from where it is. By those of eight vase-dragons is off
+/// by 9.4e-5 (step 1.19), a seventh of what it is off by anyway.
+const EVEN_STEPS_IN_CHANGING_LIGHT: u32 = 8;
+
 impl ViewConstants {
-    /// What is known of a volume, and nothing else.
-    pub(super) fn of_volume(volume: &Pyramid) -> Self {
+    /// What is known of a volume, much of which is the medium `even`, and nothing else.
+    pub(super) fn of_volume(volume: &Pyramid, even: Option<[f32; 4]>) -> Self {
         Self {
             texels: volume.levels[0].size.map(|side| side as f32),
             last_level: (volume.levels.len() - 1) as f32,
+            even: even.unwrap_or_default(),
+            even_steps: EVEN_STEPS,
             ..Self::zeroed()
         }
     }
-}
 
-/// The push constants of a view; `unit`: see [`Seen::unit`](super::seen::Seen::unit).
-pub(super) fn constants(scene: &Scene, view: &View, unit: f64) -> ViewConstants {
-    let pixel = view.pixel_at_unit_depth();
-    let (step, samples) = match scene.march {
-        March::Paper { samples } => (1.0, samples),
-        March::Default { step } => (step, 1),
-        // Of cycles alone, which are always marched by midpoints.
-        March::Exact => (CYCLE_STEP, 1),
-    };
-    ViewConstants {
-        centre: [0.5 * view.width as f32, 0.5 * view.height as f32],
-        pixel: pixel as f32,
-        near: (view.camera.near / unit) as f32,
-        lod_scale: (scene.medium.lod_footprint * pixel) as f32,
-        per_opacity_distance: (unit / scene.medium.opacity_distance) as f32,
-        step: step as f32,
-        samples,
-        ..ViewConstants::of_volume(&scene.volume)
+    /// Of an eye's view; `unit`: see [`Seen::unit`](super::seen::Seen::unit).
+    pub(super) fn of_eye(scene: &Scene, view: &View, unit: f64, even: Option<[f32; 4]>) -> Self {
+        let pixel = view.pixel_at_unit_depth();
+        let (step, samples) = match scene.march {
+            March::Paper { samples } => (1.0, samples),
+            March::Default { step } => (step, 1),
+            // Of cycles alone, which are always marched by midpoints.
+            March::Exact => (CYCLE_STEP, 1),
+        };
+        let of_volume = Self::of_volume(&scene.volume, even);
+        let mut lights = scene.shading.iter().flat_map(|shading| &shading.lights);
+        let changes =
+            |light: &Light| light.shadow || matches!(light.source, Source::Point { falloff: Some(_), .. });
+        Self {
+            centre: [0.5 * view.width as f32, 0.5 * view.height as f32],
+            pixel: pixel as f32,
+            near: (view.camera.near / unit) as f32,
+            lod_scale: (scene.medium.lod_footprint * pixel) as f32,
+            per_opacity_distance: (unit / scene.medium.opacity_distance) as f32,
+            step: step as f32,
+            samples,
+            even_steps: if lights.any(changes) { EVEN_STEPS_IN_CHANGING_LIGHT } else { EVEN_STEPS },
+            ..of_volume
+        }
     }
 }
 

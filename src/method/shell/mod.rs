@@ -130,7 +130,7 @@ impl super::Opened for Opened {
         let Self { gpu, progress, interrupt } = *self;
         let texels = longest_span(&scene)?;
         progress.stage("uploading the volume");
-        let volume = DeviceVolume::new(&gpu, &scene.volume, plan::enough_to_leap(&scene))?;
+        let volume = DeviceVolume::new(&gpu, &scene)?;
         let lit = scene.shading.as_ref().map(|shading| Lit::new(&gpu, &scene.shell, shading)).transpose()?;
         let solids = Solids::new(&gpu, &scene.solids)?;
         Ok(Box::new(Shell {
@@ -258,7 +258,6 @@ impl Method for Shell {
                 &self.scene,
                 &self.volume,
                 ways,
-                self.leaps(),
                 &*self.progress,
                 &self.interrupt,
             )?);
@@ -272,7 +271,7 @@ impl Method for Shell {
         let canvas = self.canvas.as_ref().expect("put there just now");
         watch.lap("upload");
 
-        let constants = constants::constants(&self.scene, view, seen.unit);
+        let constants = ViewConstants::of_eye(&self.scene, view, seen.unit, self.volume.even());
         let shadows = self.shadows.as_ref();
         let shadow_textures = shadows.map_or_else(Vec::new, Shadows::textures);
         if let (Some(solids), Some((solid_view, _))) = (&self.solids, &canvas.solids) {

@@ -2,6 +2,7 @@
 
 use super::Shell;
 use super::constants::wanted_samples;
+use super::volume::Enough;
 use super::walk::{self, MOST_SAMPLES};
 use crate::method::Choice;
 use crate::scene::{March, Scene, Skip, Traversal, View};
@@ -12,10 +13,17 @@ use crate::scene::{March, Scene, Skip, Traversal, View};
 const SPARSE: f64 = 0.5;
 const SPARSE_LIT: f64 = 0.1;
 
-/// The part of the volume that must be empty for rays to leap; `None` where they never do.
-pub(super) fn enough_to_leap(scene: &Scene) -> Option<f64> {
-    let may = scene.skips.allow(Skip::EmptySpace) && matches!(scene.march, March::Default { .. });
-    may.then_some(if scene.shading.is_some() { SPARSE_LIT } else { SPARSE })
+/// The same of the part that is one medium: of each leap over that one sample is taken.
+const EVEN: f64 = 0.5;
+const EVEN_LIT: f64 = 0.25;
+
+/// How much of the volume must be nothing, or one medium, for rays to leap.
+pub(super) fn enough_to_leap(scene: &Scene) -> Enough {
+    let when = |skip, lit, unlit| {
+        let may = scene.skips.allow(skip) && matches!(scene.march, March::Default { .. });
+        may.then_some(if scene.shading.is_some() { lit } else { unlit })
+    };
+    Enough { empty: when(Skip::EmptySpace, SPARSE_LIT, SPARSE), even: when(Skip::EvenSpace, EVEN_LIT, EVEN) }
 }
 
 impl Shell {
@@ -32,16 +40,10 @@ impl Shell {
             && self.has_room(view)
     }
 
-    /// Whether rays leap over what is empty.
-    pub(super) fn leaps(&self) -> bool {
-        enough_to_leap(&self.scene).is_some() && self.volume.is_sparse()
-    }
-
     /// See [`Method::plan`](crate::method::Method::plan).
     pub(super) fn choices(&self) -> Vec<Choice> {
         let allows = |skip: Skip| self.scene.skips.allow(skip);
         let lit = if self.scene.shading.is_some() { "the scene is lit" } else { "the scene is unlit" };
-        let empty = format!("{:.0} % of the volume is empty", 100.0 * self.volume.emptiness());
         let switched_off = || "it is switched off".to_owned();
         let walks = self.walks(&self.scene.view);
         let walk = if walks {
@@ -57,17 +59,20 @@ impl Shell {
             ("sort", format!("the {} is drawn so", self.scene.march))
         };
         let on = |is_on: bool| if is_on { "on" } else { "off" };
-        let leap = if !allows(Skip::EmptySpace) {
-            switched_off()
-        } else if !matches!(self.scene.march, March::Default { .. }) {
-            format!("the {} takes all its samples", self.scene.march)
-        } else {
-            let enough = 100.0 * enough_to_leap(&self.scene).unwrap_or(1.0);
-            match self.leaps() {
-                true => empty,
-                false => format!("{empty}: looking would pay from {enough:.0} % on, as {lit}"),
-            }
+        let enough = enough_to_leap(&self.scene);
+        let leap = |skip, enough: Option<f64>, is_on, found: String| match enough {
+            _ if !allows(skip) => switched_off(),
+            None => format!("the {} takes all its samples", self.scene.march),
+            Some(_) if is_on => found,
+            Some(enough) => format!("{found}: looking would pay from {:.0} % on, as {lit}", 100.0 * enough),
         };
+        let is_sparse = self.volume.is_sparse();
+        let empty = format!("{:.0} % of the volume is empty", 100.0 * self.volume.emptiness());
+        let empty = leap(Skip::EmptySpace, enough.empty, is_sparse, empty);
+        let is_even = self.volume.even().is_some();
+        let even =
+            format!("{:.0} % of the volume is one medium without directions", 100.0 * self.volume.evenness());
+        let even = leap(Skip::EvenSpace, enough.even, is_even, even);
         let saturation = if !walks {
             "all that is sorted is drawn"
         } else if allows(Skip::Saturation) {
@@ -83,7 +88,8 @@ impl Shell {
         let choice = |about, chosen, why: String| Choice { about, chosen, why };
         vec![
             choice("traversal", walk.0, walk.1),
-            choice(Skip::EmptySpace.name(), on(self.leaps()), leap),
+            choice(Skip::EmptySpace.name(), on(is_sparse), empty),
+            choice(Skip::EvenSpace.name(), on(is_even), even),
             choice(Skip::Saturation.name(), on(walks && allows(Skip::Saturation)), saturation.to_owned()),
             choice(Skip::Levels.name(), on(allows(Skip::Levels)), levels.to_owned()),
             choice(Skip::Kept.name(), on(allows(Skip::Kept)), kept.to_owned()),

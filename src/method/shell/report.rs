@@ -61,8 +61,11 @@ impl Shell {
                 }
             }
         }
-        if self.leaps() {
+        if self.volume.is_sparse() {
             report.skipped.push("rays leap over what is empty".into());
+        }
+        if self.volume.even().is_some() {
+            report.skipped.push("where the volume is one medium several steps are one".into());
         }
         if !seen.minified && self.scene.skips.allow(Skip::Levels) {
             report.skipped.push("all is magnified: no level of detail but 0 is compiled in".into());

@@ -89,7 +89,6 @@ impl Shadows {
         scene: &Scene,
         volume: &DeviceVolume,
         ways: &Ways,
-        leaps: bool,
         progress: &dyn Progress,
         interrupt: &Interrupt,
     ) -> Result<Self> {
@@ -123,7 +122,7 @@ impl Shadows {
         };
         // First: rays are followed no farther.
         shadows.draw_blockers(gpu, scene, interrupt)?;
-        shadows.draw_curves(gpu, scene, volume, ways, leaps, &|done| {
+        shadows.draw_curves(gpu, scene, volume, ways, &|done| {
             progress.fraction(done);
             interrupt.check()
         })?;
@@ -210,7 +209,6 @@ impl Shadows {
         scene: &Scene,
         volume: &DeviceVolume,
         ways: &Ways,
-        leaps: bool,
         between: &dyn Fn(f64) -> Result<()>,
     ) -> Result<()> {
         let step = match scene.march {
@@ -223,7 +221,7 @@ impl Shadows {
             lod_scale: scene.medium.lod_footprint as f32,
             step: step as f32,
             samples: 1,
-            ..ViewConstants::of_volume(&scene.volume)
+            ..ViewConstants::of_volume(&scene.volume, volume.even())
         };
         let pictures = Buffer::storage(gpu, "the lights' pictures", &self.pictures_of_no_eye())?;
         let mut textures = volume.textures_of_lights(gpu, &scene.volume)?;
@@ -248,7 +246,7 @@ impl Shadows {
             let minified = seen.minified || !scene.skips.allow(Skip::Levels);
             let pipelines = &mut pipelines[usize::from(minified)];
             if pipelines.is_none() {
-                *pipelines = Some(self.curve_pipelines(gpu, scene, leaps, volume.levels(minified))?);
+                *pipelines = Some(self.curve_pipelines(gpu, scene, volume, volume.levels(minified))?);
             }
             let CurvePipelines { walk: walking, left } = pipelines.as_ref().expect("made just now");
             let cells_of_left =
@@ -287,13 +285,12 @@ impl Shadows {
         &self,
         gpu: &Arc<Gpu>,
         scene: &Scene,
-        leaps: bool,
+        volume: &DeviceVolume,
         levels: Levels,
     ) -> Result<CurvePipelines> {
-        let mut switches = Vec::new();
+        let mut switches = volume.switches().to_vec();
         let mut textures = vec![8];
-        if leaps {
-            switches.push("SPARSE");
+        if !switches.is_empty() {
             textures.push(22);
         }
         if self.blockers.is_some() {
@@ -317,6 +314,8 @@ impl Shadows {
             keeps: Keeps::Nearest,
         };
         let walk = Pipeline::new(gpu, &self.curves, &info)?;
+        // Those that are left leap over nothing but what is empty.
+        switches.retain(|&switch| switch != "SPARSE" || volume.is_sparse());
         let info = PipelineInfo {
             vertex: shaders::TILE_VERT.with(&["LIGHT"]),
             fragment: shaders::SHADOW_LEFT_FRAG.with(&switches),

@@ -27,17 +27,17 @@ impl Shell {
             longest_span(&scene)?
         };
 
-        let volume = if same_volume && enough_to_leap(before) == enough_to_leap(&scene) {
-            kept.push("the volume is kept on the device: it is the same".to_owned());
-            None
-        } else {
-            self.progress.stage("uploading the volume");
-            Some(DeviceVolume::new(&self.gpu, &scene.volume, enough_to_leap(&scene))?)
-        };
         let same_directions = match (&before.shading, &scene.shading) {
             (Some(a), Some(b)) => Arc::ptr_eq(&a.directions, &b.directions) && a.model == b.model,
             (None, None) => true,
             _ => false,
+        };
+        let volume = if same_volume && same_directions && enough_to_leap(before) == enough_to_leap(&scene) {
+            kept.push("the volume is kept on the device: it is the same".to_owned());
+            None
+        } else {
+            self.progress.stage("uploading the volume");
+            Some(DeviceVolume::new(&self.gpu, &scene)?)
         };
         let lit = match &scene.shading {
             Some(shading) if !same_directions => Some(Lit::new(&self.gpu, &scene.shell, shading)?),

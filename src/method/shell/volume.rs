@@ -1,57 +1,103 @@
-//! The volume on the device: its texture, and the distances by which rays leap over what is empty in it.
+//! The volume on the device: its texture, and the distances by which rays leap over what most of it is.
 
 use std::cell::OnceCell;
 use std::sync::Arc;
 
-use rayon::prelude::*;
-
 use super::constants::Levels;
+use super::plan::enough_to_leap;
 use crate::gpu::{Gpu, Sampled, Texture3d};
-use crate::volume::{Proximity, Pyramid};
+use crate::scene::Scene;
+use crate::volume::{Proximity, Pyramid, commonest, part_like};
 use crate::{Error, Result};
 
-/// The volume's texture, and what tells rays where in it nothing is.
+/// The volume's texture, and what tells rays where in it nothing is, or a medium that is the same everywhere.
 pub struct DeviceVolume {
     /// Of the volume itself.
     texture: Texture3d,
     /// Of its opacity alone, once a light has looked through it; `None` where the device cannot hold it besides.
     alpha: OnceCell<Option<Texture3d>>,
-    /// Where enough of it is empty.
-    proximity: Option<Texture3d>,
+    /// Where enough of it is nothing, or that medium.
+    leap: Option<Leap>,
     emptiness: f64,
+    evenness: f64,
+}
+
+/// What rays leap over, and how far it goes.
+struct Leap {
+    over: [f32; 4],
+    proximity: Texture3d,
+}
+
+/// The parts of a volume that must be nothing, or one medium, for rays to leap over it; `None` where they never do.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Enough {
+    /// Nothing.
+    pub empty: Option<f64>,
+    /// A medium.
+    pub even: Option<f64>,
 }
 
 impl DeviceVolume {
-    /// Uploads a volume; and where at least the part `enough` of it is empty, the distances by which rays leap, unless `enough` is
-    /// `None`.
+    /// Uploads a scene's volume; and where enough of it is nothing, or one medium in which there are no directions, the distances by
+    /// which rays leap over the more frequent of the two.
     ///
     /// # Errors
     /// As [`Texture3d::upload`].
-    pub fn new(gpu: &Arc<Gpu>, volume: &Pyramid, enough: Option<f64>) -> Result<Self> {
+    pub fn new(gpu: &Arc<Gpu>, scene: &Scene) -> Result<Self> {
+        let volume = &*scene.volume;
+        let enough = enough_to_leap(scene);
         let texture = Texture3d::upload(gpu, "the volume", volume)?;
-        let full = &volume.levels[0].texels;
-        let mut emptiness =
-            full.par_iter().filter(|texel| texel[3] == 0.0).count() as f64 / full.len() as f64;
-        let mut proximity = None;
-        // Around what is seen less is empty: where these texels are too few, distances need not be known.
-        if enough.is_some_and(|enough| emptiness >= enough) {
-            let distances = Proximity::new(volume);
-            emptiness = distances.emptiness();
-            if enough.is_some_and(|enough| emptiness >= enough) {
-                proximity = Some(Texture3d::upload_proximity(gpu, "the volume's distances", &distances)?);
+        let full = &volume.levels[0];
+        let nothing = [0.0; 4];
+        let mut device = Self { texture, alpha: OnceCell::new(), leap: None, emptiness: 0.0, evenness: 0.0 };
+        device.emptiness = part_like(full, nothing);
+        let medium = enough.even.and_then(|_| commonest(full));
+        device.evenness = medium.map_or(0.0, |medium| part_like(full, medium));
+        let (over, part, enough) = match medium {
+            Some(medium) if device.evenness > device.emptiness => (medium, &mut device.evenness, enough.even),
+            _ => (nothing, &mut device.emptiness, enough.empty),
+        };
+        // Around what is unlike it less is so: where these texels are too few, distances need not be known.
+        if enough.is_some_and(|enough| *part >= enough) {
+            let directions = scene.shading.as_ref().map(|shading| &*shading.directions);
+            let proximity = Proximity::new(volume, directions, over);
+            *part = proximity.part();
+            if enough.is_some_and(|enough| *part >= enough) {
+                let proximity = Texture3d::upload_proximity(gpu, "the volume's distances", &proximity)?;
+                device.leap = Some(Leap { over, proximity });
             }
         }
-        Ok(Self { texture, alpha: OnceCell::new(), proximity, emptiness })
+        Ok(device)
     }
 
-    /// Whether there are distances by which rays can leap.
+    /// Whether rays leap over what is empty.
     pub fn is_sparse(&self) -> bool {
-        self.proximity.is_some()
+        self.leap.as_ref().is_some_and(|leap| leap.over[3] == 0.0)
+    }
+
+    /// The medium over which rays leap.
+    pub fn even(&self) -> Option<[f32; 4]> {
+        self.leap.as_ref().map(|leap| leap.over).filter(|over| over[3] > 0.0)
+    }
+
+    /// What is compiled into shaders that leap.
+    pub(super) fn switches(&self) -> &'static [&'static str] {
+        match (self.is_sparse(), self.even()) {
+            (true, _) => &["SPARSE"],
+            (_, Some(_)) => &["SPARSE", "EVEN"],
+            _ => &[],
+        }
     }
 
     /// The part, 0..1, of the full volume in which nothing is seen; at most that, where it is too little to leap.
     pub fn emptiness(&self) -> f64 {
         self.emptiness
+    }
+
+    /// The part, 0..1, of the full volume that is the most frequent medium, without directions; at most that, where it is too little to
+    /// leap, and 0 where rays never do.
+    pub fn evenness(&self) -> f64 {
+        self.evenness
     }
 
     /// Of its levels of detail, what shaders read.
@@ -88,7 +134,7 @@ impl DeviceVolume {
     }
 
     fn with<'a>(&'a self, texture: &'a Texture3d) -> Vec<(u32, Sampled<'a>)> {
-        let textures = [(8, Some(texture)), (22, self.proximity.as_ref())];
+        let textures = [(8, Some(texture)), (22, self.leap.as_ref().map(|leap| &leap.proximity))];
         textures
             .into_iter()
             .filter_map(|(binding, texture)| Some((binding, Sampled::Texture(texture?))))
