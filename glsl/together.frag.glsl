@@ -1,6 +1,6 @@
 #version 450
 #extension GL_ARB_shading_language_include : require
-// switches: DEPTH SOLIDS LIT SHADOWS(LIT)
+// switches: DEPTH SOLIDS SPARSE EVEN(SPARSE) LIT SHADOWS(LIT)
 // Walks a ray that is in several parts of the shell at once: a walker in each part. From one entry or exit to the
 // next the media of all walkers add. A pixel that is too much for that is left to the host: it becomes infinite.
 
@@ -66,7 +66,6 @@ void main() {
 #endif
     Light light = Light(Gathered(vec4(0.0), vec4(0.0)), 0.0);
     uint passes = 0;
-    float z = view.near;
     if (is_begun) {
         // Any of the parts that it leaves may be one that it begins in: as many as it leaves more often than it enters.
         int begun = 0;
@@ -83,77 +82,140 @@ void main() {
         is_left = is_left || int(walkers) < begun;
     }
     int next = first;
-    while (!is_left && passes < MOST_PASSES) {
-        passes++;
-        uint entry = NOWHERE;
-        while (entry == NOWHERE && next < last) {
-            uint crossing = texelFetch(crossings, next).x;
-            if ((crossing & LEAVES) != 0) next++;
-            else entry = crossing;
-        }
-        float horizon = FAR;
-        if (entry != NOWHERE && !enters(faces_at(entry, ray), ray, horizon)) is_left = true;
-        if (walkers == 0) {
-            if (entry == NOWHERE) break;
-            z = max(z, horizon);
-        }
-        float stop = min(horizon, farthest);
-        for (uint i = 0; i < walkers; i++) stop = min(stop, ends[i]);
-        if (stop > z) {
-            uint samples = 1;
-            for (uint i = 0; i < walkers; i++) {
-                vec4 rows[3];
-                texture_of(places[i] >> 2, rows);
-                samples = max(samples, sample_count(path_in(rows, ray), z, stop));
-            }
-            passes += samples * (walkers * PASSES_A_SAMPLE + 1);
-            float step = (stop - z) / float(samples);
-            for (uint sample_index = 0; sample_index < samples; sample_index++) {
-                float at = z + (float(sample_index) + 0.5) * step;
-                Sum sum = nothing();
-                for (uint i = 0; i < walkers; i++) {
-                    vec4 rows[3];
-                    texture_of(places[i] >> 2, rows);
-#ifdef LIT
-                    enter(places[i] >> 2, ray);
+    uint entry = NOWHERE;
+    float horizon = FAR; // where it is entered
+    // The way from one entry or exit to the next, in equal steps; which of them, and which walker in it, is next.
+    float begin = view.near;
+    float stop = view.near;
+    uint steps = 0;
+    uint step_index = 0;
+    uint walker = 0;
+    Sum sum = nothing();
+#ifdef EVEN
+    float even_paths = 0.0; // those of all walkers, in the even stretch
 #endif
-                    add(sum, radiant(path_in(rows, ray), at), step * per_depth);
+    bool is_done = false;
+    while (!is_left && passes < MOST_PASSES) {
+        // On to where something may be seen: where several pixels run at once, all of them wait here for one another.
+        while (step_index == steps && passes < MOST_PASSES) {
+            passes++;
+            begin = stop;
+            steps = 0;
+            step_index = 0;
+            uint i = 0;
+            while (i < walkers) {
+                if (ends[i] <= begin) {
+                    uint place = texelFetch(beyond, int(exits[i])).x;
+                    passes++;
+                    if (place == NOWHERE) {
+                        passes += uint(last - first);
+                        is_left = is_left || !leaves_by(exits[i], ends[i], first, last, ray);
+                    }
+                    if (place != NOWHERE) {
+                        places[i] = place;
+                        exits[i] = exit_of(faces_at(place, ray), ends[i]);
+                    }
+                    if (place == NOWHERE || exits[i] == NOWHERE) {
+                        is_left = is_left || place != NOWHERE;
+                        walkers--;
+                        places[i] = places[walkers];
+                        exits[i] = exits[walkers];
+                        ends[i] = ends[walkers];
+                    }
+                    continue;
                 }
-                vec4 mixed = mixture(sum);
-                light.depth += transmittance(light.gathered) * mixed.a * at;
-                lay_behind(light.gathered, mixed);
+                i++;
             }
-            z = stop;
-        }
-        if (z >= farthest || transmittance(light.gathered) <= SATURATED) break;
-        uint i = 0;
-        while (i < walkers) {
-            if (ends[i] <= z) {
-                uint place = texelFetch(beyond, int(exits[i])).x;
-                passes++;
-                if (place == NOWHERE) {
-                    passes += uint(last - first);
-                    is_left = is_left || !leaves_by(exits[i], ends[i], first, last, ray);
-                }
-                if (place != NOWHERE) {
-                    places[i] = place;
-                    exits[i] = exit_of(faces_at(place, ray), ends[i]);
-                }
-                if (place == NOWHERE || exits[i] == NOWHERE) {
-                    is_left = is_left || place != NOWHERE;
-                    walkers--;
-                    places[i] = places[walkers];
-                    exits[i] = exits[walkers];
-                    ends[i] = ends[walkers];
-                }
+            if (entry != NOWHERE && horizon <= begin) {
+                next++;
+                begin_at(entry, ray);
+            }
+            entry = NOWHERE;
+            while (entry == NOWHERE && next < last) {
+                uint crossing = texelFetch(crossings, next).x;
+                if ((crossing & LEAVES) != 0) next++;
+                else entry = crossing;
+            }
+            horizon = FAR;
+            if (entry != NOWHERE && !enters(faces_at(entry, ray), ray, horizon)) is_left = true;
+            is_done = begin >= farthest || (walkers == 0 && entry == NOWHERE);
+            if (is_done || is_left || (walkers == 0 && even_waits())) break;
+            if (walkers == 0) {
+                stop = max(begin, horizon);
                 continue;
             }
-            i++;
+            stop = min(horizon, farthest);
+            for (uint i = 0; i < walkers; i++) stop = min(stop, ends[i]);
+            if (!(stop > begin)) {
+                stop = begin;
+                continue;
+            }
+            steps = 1;
+            bool is_even = true;
+            for (uint i = 0; i < walkers; i++) {
+                Path path = path_of(places[i] >> 2, ray);
+#ifdef EVEN
+                Steps alone = steps_of(path, vec2(begin, stop));
+                is_even = is_even && are_even(path, alone);
+                steps = max(steps, alone.count);
+#else
+                steps = max(steps, sample_count(path, begin, stop));
+#endif
+            }
+            passes += walkers;
+#ifdef EVEN
+            if (is_even && steps <= view.even_steps - even.steps) {
+                even_paths = (even_waits() ? even_paths : 0.0) + float(walkers) * (stop - begin);
+                pass_evenly(begin, stop, steps);
+                steps = 0;
+                if (even_is_full()) break;
+            } else if (is_even) {
+                steps = (steps + view.even_steps - 1) / view.even_steps;
+            }
+#endif
         }
-        if (entry != NOWHERE && horizon <= z) {
-            next++;
-            begin_at(entry, ray);
+        if (step_index < steps || even_waits()) {
+            // What one walker adds to a step, or all that was even.
+            uint cell = places[walker] >> 2;
+            float size = (stop - begin) / float(max(steps, 1u));
+            float z = begin + (float(step_index) + 0.5) * size;
+            Path path = path_of(cell, ray);
+            vec4 texel = fetch(path, z);
+            bool is_even = even_waits();
+#ifdef EVEN
+            float optical = extinction(view.even) * max(even_paths * per_depth, LEAST);
+            if (is_even) {
+                texel = view.even;
+                z = even.begin + (even.end - even.begin) * mean_depth(optical, opacity(optical));
+            }
+#endif
+#ifdef LIT
+            enter(cell, ray);
+            texel = lit(texel, is_even ? vec4(0.0) : fetch_from(directions, path, z), z);
+#endif
+            vec4 mixed = vec4(0.0);
+#ifdef EVEN
+            if (is_even) {
+                float alpha = opacity(optical);
+                mixed = vec4(emitted(texel, alpha), alpha);
+                even.steps = 0;
+            }
+#endif
+            if (!is_even) {
+                add(sum, texel, size * per_depth);
+                walker++;
+                if (walker == walkers) {
+                    mixed = mixture(sum);
+                    sum = nothing();
+                    walker = 0;
+                    step_index++;
+                }
+            }
+            light.depth += transmittance(light.gathered) * mixed.a * z;
+            lay_behind(light.gathered, mixed);
+            passes += PASSES_A_SAMPLE;
         }
+        if ((is_done && !even_waits()) || transmittance(light.gathered) <= SATURATED) break;
     }
     is_left = is_left || passes >= MOST_PASSES;
     out_rgba = is_left ? vec4(uintBitsToFloat(0x7f800000u)) : light.gathered.rgba;

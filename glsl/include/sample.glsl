@@ -137,6 +137,21 @@ struct Even {
 };
 
 Even even = Even(0.0, 0.0, 0);
+
+// Adds what follows.
+void pass_evenly(float begin, float end, uint steps) {
+    if (even.steps == 0) even.begin = begin;
+    if (steps > 0) even.end = end;
+    even.steps += steps;
+}
+
+// Whether all of these steps are even, as far as is known from their middle.
+bool are_even(Path path, Steps steps) {
+    float along = 0.5 * float(steps.count);
+    vec3 point = path.at_eye + (steps.begin + along * steps.size) * path.from_depth;
+    float distance = round(255.0 * textureLod(proximity, point, max(steps.level, 0.0)).x);
+    return steps.level >= 0.0 && (distance - 1.0) * steps.per_texel >= along;
+}
 #endif
 
 // Whether there is such a stretch.
@@ -170,9 +185,7 @@ uint seek(Path path, Steps steps, uint i, inout uint passes) {
         uint leap = is_near ? 0 : 1 + uint((distance - 1.0) * steps.per_texel);
 #ifdef EVEN
         leap = min(leap, min(steps.count - i, view.even_steps - even.steps));
-        if (even.steps == 0) even.begin = steps.begin + float(i) * steps.size;
-        if (leap > 0) even.end = steps.begin + float(i + leap) * steps.size;
-        even.steps += leap;
+        pass_evenly(steps.begin + float(i) * steps.size, steps.begin + float(i + leap) * steps.size, leap);
 #endif
         i += leap;
         if (is_near || i >= steps.count || even_is_full()) break;
