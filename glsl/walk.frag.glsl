@@ -13,6 +13,8 @@
 #include "solids.glsl"
 #include "walk.glsl"
 
+layout(early_fragment_tests) in; // by mark
+
 layout(location = 0) out vec4 out_rgba; // premultiplied
 #ifdef DEPTH
 layout(location = 1) out vec4 out_depth; // (distance * alpha, 0, 0, alpha)

@@ -1,8 +1,11 @@
 #version 450
 #extension GL_ARB_shading_language_include : require
-// Squares of pixels that cover the picture, row by row, as two triangles each: parts in which it may be drawn.
+// switches: TOGETHER
+// Squares of pixels that cover the picture, row by row, as two triangles each: parts in which it may be drawn. Their depth is the
+// mark of the pixels that are.
 
 #include "shell.glsl"
+#include "marks.glsl"
 
 const uint SIDE = 64; // as in src/method/shell/squares.rs
 
@@ -13,5 +16,10 @@ void main() {
     uint square = gl_VertexIndex / 6;
     uint corner = CORNERS[gl_VertexIndex % 6];
     uvec2 at = uvec2(square % columns, square / columns) + uvec2(corner == 1 || corner == 2, corner >= 2);
-    gl_Position = vec4(vec2(at * SIDE) / view.centre - 1.0, 0.0, 1.0);
+#ifdef TOGETHER
+    const float mark = INTRICATE_MARK;
+#else
+    const float mark = ALONE_MARK;
+#endif
+    gl_Position = vec4(vec2(at * SIDE) / view.centre - 1.0, mark, 1.0);
 }

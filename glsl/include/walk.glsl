@@ -1,21 +1,16 @@
 // From tetrahedron to tetrahedron along a ray (M. Garrity, Raytracing irregular volume data, 1990): out of each by the face
 // that the ray meets first, into the neighbour there. What is fetched is small and far apart, for which texels are made.
 
-layout(constant_id = 5) const bool INSIDE = false; // whether rays begin in the shell
+#include "crossings.glsl"
 
 layout(set = 0, binding = 18) uniform samplerBuffer cells;    // of src/method/shell/seen.rs, nine texels each
 layout(set = 0, binding = 19) uniform usamplerBuffer beyond;  // four a tetrahedron: the place beyond each face, or NOWHERE
-layout(set = 0, binding = 20) uniform usamplerBuffer of_pixels; // each pixel's range of `crossings`, row by row
 layout(set = 0, binding = 21) uniform usamplerBuffer crossings; // places where rays enter the shell and leave it, front to back
 
 // A place is four times a tetrahedron and the number of its face.
 const uint NOWHERE = 0xffffffffu;
 // In `crossings`: here the ray leaves the shell; else it enters it.
 const uint LEAVES = 0x80000000u;
-// In the first number of `of_pixels`: the ray is in two parts of the shell at once; it begins in the shell.
-const uint INTRICATE = 0x80000000u;
-const uint BEGUN = 0x40000000u;
-
 layout(constant_id = 6) const float SATURATED = 0.0; // where no more is let through the rest is not looked at
 
 // Passes through loops after which a pixel is left: an eye's to the host. lavapipe runs eight pixels at once, all of them as often as the
@@ -69,16 +64,6 @@ Path path_of(uint cell, vec3 ray) {
 #else
     return path_in(rows, ray);
 #endif
-}
-
-// The crossings of a pixel, from `next` to before `last`; returns whether its ray is intricate. Where several pixels run at once, those
-// that are discarded may run on with the others: so that they soon stop, they should have no crossings then.
-bool crossings_of(uvec2 pixel, out int next, out int last, out bool is_begun) {
-    uvec2 range = texelFetch(of_pixels, int(pixel.y * uint(2.0 * view.centre.x) + pixel.x)).xy;
-    next = int(range.x & ~(INTRICATE | BEGUN));
-    last = int(range.y);
-    is_begun = INSIDE && (range.x & BEGUN) != 0;
-    return (range.x & INTRICATE) != 0;
 }
 
 // Parts of the shell may touch at faces that know nothing of one another, and rays may lie in the planes of those. Then f32 takes

@@ -172,7 +172,7 @@ impl Gpu {
     /// # Errors
     /// [`Error::Device`] where a side is too long, [`Error::OutOfMemory`].
     pub fn check_sizes(&self, picture: [u32; 2], volume: [u32; 3]) -> Result<()> {
-        Target::check(self, "the picture", picture, 1, ReadBy::Host)?;
+        Target::check(self, "the picture", picture, 1, ReadBy::Host { marked: true })?;
         Texture3d::check(self, "the volume", volume, most_levels(volume))?;
         Ok(())
     }

@@ -24,6 +24,10 @@ pub enum Keeps {
     Last,
     /// That of the greatest depth value, for targets that keep the nearest; both sides of triangles are drawn.
     Nearest,
+    /// None: each marks its pixel by its depth value, for targets that have marks.
+    Marks,
+    /// As `Blend`, and only of pixels that are marked by its depth value. Shaders should test that before they run.
+    BlendMarked,
 }
 
 /// What a [`Pipeline`] is made of: bindings and bytes are those that its shaders use.
@@ -70,7 +74,7 @@ pub struct Pipeline {
     format: Rgba,
     attachments: usize,
     /// Whether they have depths.
-    nearest: bool,
+    has_depths: bool,
     gpu: Arc<Gpu>,
     // One thread at a time binds and draws.
     not_shared: PhantomData<Cell<()>>,
@@ -87,7 +91,15 @@ impl Pipeline {
     pub fn new(gpu: &Arc<Gpu>, target: &Target, info: &PipelineInfo<'_>) -> Result<Self> {
         assert!(Arc::ptr_eq(gpu, &target.gpu), "the target is another device's");
         let nearest = info.keeps == Keeps::Nearest;
-        assert_eq!(nearest, target.depth.is_some(), "a target for the other kind of pipeline");
+        let blends = matches!(info.keeps, Keeps::Blend | Keeps::BlendMarked);
+        let depths = match info.keeps {
+            Keeps::Nearest => Some((vk::CompareOp::GREATER, true)),
+            Keeps::Marks => Some((vk::CompareOp::ALWAYS, true)),
+            Keeps::BlendMarked => Some((vk::CompareOp::EQUAL, false)),
+            Keeps::Blend | Keeps::Last => None,
+        };
+        let has_depths = target.depth.is_some();
+        assert!(depths.is_none() || has_depths, "a target for the other kind of pipeline");
         assert!((4..=128).contains(&info.push_constant_bytes) && info.push_constant_bytes.is_multiple_of(4));
         // From here on `Drop` cleans up, null handles included.
         let mut pipeline = Self {
@@ -104,7 +116,7 @@ impl Pipeline {
             push_constant_bytes: info.push_constant_bytes,
             format: target.format,
             attachments: target.attachments(),
-            nearest,
+            has_depths,
             gpu: gpu.clone(),
             not_shared: PhantomData,
         };
@@ -145,22 +157,25 @@ impl Pipeline {
             .rasterization_samples(vk::SampleCountFlags::TYPE_1);
         let blends = vec![
             vk::PipelineColorBlendAttachmentState {
-                blend_enable: (info.keeps == Keeps::Blend).into(),
+                blend_enable: blends.into(),
                 src_color_blend_factor: vk::BlendFactor::ONE_MINUS_DST_ALPHA,
                 dst_color_blend_factor: vk::BlendFactor::ONE,
                 color_blend_op: vk::BlendOp::ADD,
                 src_alpha_blend_factor: vk::BlendFactor::ONE_MINUS_DST_ALPHA,
                 dst_alpha_blend_factor: vk::BlendFactor::ONE,
                 alpha_blend_op: vk::BlendOp::ADD,
-                color_write_mask: vk::ColorComponentFlags::RGBA,
+                color_write_mask: match info.keeps {
+                    Keeps::Marks => vk::ColorComponentFlags::empty(),
+                    _ => vk::ColorComponentFlags::RGBA,
+                },
             };
             target.attachments()
         ];
         let blending = vk::PipelineColorBlendStateCreateInfo::default().attachments(&blends);
         let depth = vk::PipelineDepthStencilStateCreateInfo::default()
-            .depth_test_enable(nearest)
-            .depth_write_enable(nearest)
-            .depth_compare_op(vk::CompareOp::GREATER);
+            .depth_test_enable(depths.is_some())
+            .depth_write_enable(depths.is_some_and(|(_, writes)| writes))
+            .depth_compare_op(depths.map_or(vk::CompareOp::ALWAYS, |(compares, _)| compares));
         let dynamic = vk::PipelineDynamicStateCreateInfo::default()
             .dynamic_states(&[vk::DynamicState::VIEWPORT, vk::DynamicState::SCISSOR]);
         let create_info = vk::GraphicsPipelineCreateInfo::default()
@@ -244,7 +259,7 @@ impl Pipeline {
             .chain([&draw.target.gpu]);
         assert!(devices.into_iter().all(|gpu| Arc::ptr_eq(gpu, &self.gpu)), "objects of several devices");
         assert_eq!((draw.target.format, draw.target.attachments()), (self.format, self.attachments));
-        assert_eq!(draw.target.depth.is_some(), self.nearest, "a target for the other kind of pipeline");
+        assert_eq!(draw.target.depth.is_some(), self.has_depths, "a target for the other kind of pipeline");
         for (_, texture) in draw.textures {
             if let Sampled::Picture(picture) = texture {
                 assert!(picture.sampler != vk::Sampler::null(), "a target that shaders cannot read");

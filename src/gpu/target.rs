@@ -19,7 +19,7 @@ pub struct Target {
     pub(super) height: u32,
     /// For the host one for each attachment; for shaders a single one, with a layer for each.
     pub(super) images: Vec<DeviceImage>,
-    /// That the nearest of several surfaces is kept by.
+    /// That the nearest of several surfaces is kept by, or by which pixels are marked.
     pub(super) depth: Option<DeviceImage>,
     /// What the host reads; none for shaders.
     pub(super) readbacks: Vec<Buffer>,
@@ -41,8 +41,11 @@ pub struct Target {
 /// Who reads a target.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum ReadBy {
-    /// From a copy in its memory.
-    Host,
+    /// From a copy in its memory. With a depth image, where pixels are `marked`.
+    Host {
+        /// See [`Keeps::Marks`](super::Keeps::Marks).
+        marked: bool,
+    },
     /// With a depth image, where the `nearest` is kept.
     Shaders {
         /// See [`Keeps::Nearest`](super::Keeps::Nearest).
@@ -50,21 +53,26 @@ pub(super) enum ReadBy {
     },
 }
 
-/// Of surfaces.
+/// Of surfaces, and marks.
 const DEPTH_FORMAT: vk::Format = vk::Format::D32_SFLOAT;
 
 impl Target {
-    /// `attachments` images of `width x height` pixels that the host reads, in the most accurate format that the device blends.
+    /// `attachments` images of `width x height` pixels that the host reads, in the most accurate format that the device blends; pixels
+    /// can be `marked`.
     ///
     /// # Errors
-    /// [`Error::Usage`] where a side is 0; [`Error::Device`] where one is longer than the device allows;
+    /// [`Error::Usage`] where a side is 0; [`Error::Device`] where one is longer than the device allows, or pixels cannot be marked;
     /// [`Error::OutOfMemory`].
     ///
     /// # Panics
     /// Where there are no attachments.
-    pub fn new(gpu: &Arc<Gpu>, width: u32, height: u32, attachments: usize) -> Result<Self> {
-        let (format, bytes) = Self::check(gpu, "the picture", [width, height], attachments, ReadBy::Host)?;
-        let mut target = Self::empty(gpu, "the picture", format, [width, height], [attachments, 1])?;
+    pub fn new(gpu: &Arc<Gpu>, [width, height]: [u32; 2], attachments: usize, marked: bool) -> Result<Self> {
+        let name = "the picture";
+        let (format, bytes) = Self::check(gpu, name, [width, height], attachments, ReadBy::Host { marked })?;
+        let mut target = Self::empty(gpu, name, format, [width, height], [attachments, 1])?;
+        if marked {
+            target.keep_depths(name)?;
+        }
         target.readbacks =
             (0..attachments).map(|_| Buffer::readback(gpu, "the picture", bytes)).collect::<Result<_>>()?;
         target.finish()
@@ -88,15 +96,7 @@ impl Target {
         let (format, _) = Self::check(gpu, name, [width, height], attachments, ReadBy::Shaders { nearest })?;
         let mut target = Self::empty(gpu, name, format, [width, height], [1, attachments])?;
         if nearest {
-            let features = vk::FormatFeatureFlags::DEPTH_STENCIL_ATTACHMENT;
-            if !gpu.supports(DEPTH_FORMAT, features) {
-                let message = format!("{} has no depth buffer of 32 bits", gpu.info().name);
-                return Err(Error::Device { message, help: None });
-            }
-            let usage = vk::ImageUsageFlags::DEPTH_STENCIL_ATTACHMENT;
-            let info = image_info(DEPTH_FORMAT, [width, height], 1, usage);
-            let aspect = vk::ImageAspectFlags::DEPTH;
-            target.depth = Some(DeviceImage::new(gpu, name, &info, vk::ImageViewType::TYPE_2D, aspect)?);
+            target.keep_depths(name)?;
         }
         let clamp = vk::SamplerAddressMode::CLAMP_TO_EDGE;
         // With a bound of 0 lavapipe 22.3 would look up the level of each pixel by itself, as if there were several.
@@ -113,6 +113,19 @@ impl Target {
     /// Lets the next draw begin with a small part, as if it were the first.
     pub fn forget_pace(&self) {
         self.pace.set(None);
+    }
+
+    fn keep_depths(&mut self, name: &'static str) -> Result<()> {
+        let gpu = &self.gpu;
+        if !gpu.supports(DEPTH_FORMAT, vk::FormatFeatureFlags::DEPTH_STENCIL_ATTACHMENT) {
+            let message = format!("{} has no depth buffer of 32 bits", gpu.info().name);
+            return Err(Error::Device { message, help: None });
+        }
+        let usage = vk::ImageUsageFlags::DEPTH_STENCIL_ATTACHMENT;
+        let info = image_info(DEPTH_FORMAT, [self.width, self.height], 1, usage);
+        let aspect = vk::ImageAspectFlags::DEPTH;
+        self.depth = Some(DeviceImage::new(gpu, name, &info, vk::ImageViewType::TYPE_2D, aspect)?);
+        Ok(())
     }
 
     /// Images, but nothing that draws or reads.
@@ -206,7 +219,7 @@ impl Target {
             });
         }
         let (format, lacks) = match read_by {
-            ReadBy::Host => {
+            ReadBy::Host { .. } => {
                 let features =
                     vk::FormatFeatureFlags::COLOR_ATTACHMENT_BLEND | vk::FormatFeatureFlags::TRANSFER_SRC;
                 (Rgba::best(gpu, features), "blends into no floating-point target")
@@ -224,16 +237,11 @@ impl Target {
         let pixels = u64::from(width) * u64::from(height);
         let bytes = pixels * format.bytes();
         let all = attachments as u64 * bytes;
-        let besides = match read_by {
-            ReadBy::Host => all,
-            ReadBy::Shaders { nearest } => {
-                if nearest {
-                    4 * pixels
-                } else {
-                    0
-                }
-            }
+        let (copies, depths) = match read_by {
+            ReadBy::Host { marked } => (all, marked),
+            ReadBy::Shaders { nearest } => (0, nearest),
         };
+        let besides = copies + if depths { 4 * pixels } else { 0 };
         gpu.check_memory(name, all + besides)?;
         let most = gpu.limits.max_color_attachments;
         if attachments > most as usize {

@@ -33,6 +33,8 @@ enum Medium {
         list: Buffer,
     },
     Walked {
+        /// Marks pixels by what their rays meet.
+        mark: Pipeline,
         pipeline: Pipeline,
         /// For squares in which all is magnified, where others are not.
         magnified: Option<Pipeline>,
@@ -79,7 +81,7 @@ impl Canvas {
                 };
                 seen.runs.iter().map(batch).collect()
             }
-            Medium::Walked { pipeline, magnified, together, .. } => {
+            Medium::Walked { mark, pipeline, magnified, together, .. } => {
                 let end = 6 * seen.minified_squares.len() as u32;
                 let mut batches = match magnified {
                     None => vec![Batch { pipeline, vertices: 0..end }],
@@ -93,6 +95,7 @@ impl Canvas {
                 };
                 // Squares do not overlap: those of one pipeline are drawn together.
                 batches.sort_by_key(|batch| std::ptr::eq(batch.pipeline, pipeline));
+                batches.insert(0, Batch { pipeline: mark, vertices: 0..end });
                 batches.extend(together.iter().map(|pipeline| Batch { pipeline, vertices: 0..end }));
                 batches
             }
@@ -200,7 +203,8 @@ impl Shell {
     }
 
     fn new_canvas(&self, kind: CanvasKind, sight: &Sight, seen: &Seen, view: &View) -> Result<Canvas> {
-        let target = Target::new(&self.gpu, kind.width, kind.height, if kind.depth { 2 } else { 1 })?;
+        let attachments = if kind.depth { 2 } else { 1 };
+        let target = Target::new(&self.gpu, [kind.width, kind.height], attachments, kind.walks)?;
         let on = &kind.switches;
         let mut uniform_buffers = Vec::new();
         let buffers = if kind.walks { Vec::new() } else { vec![0, 1, 2] };
@@ -251,9 +255,20 @@ impl Shell {
                 (Buffer::storage(&self.gpu, "the tetrahedra", &seen.cells)?, medium)
             }
             Sight::Walked(crossings) => {
+                let mark = PipelineInfo {
+                    vertex: shaders::WALK_VERT.with(&[]),
+                    fragment: shaders::MARK_FRAG.with(&[]),
+                    uniform_buffers: &[],
+                    texel_buffers: &[20],
+                    textures: &[],
+                    keeps: Keeps::Marks,
+                    ..info
+                };
+                let mark = Pipeline::new(&self.gpu, &target, &mark)?;
                 let walked = PipelineInfo {
-                    vertex: shaders::WALK_VERT.with(on),
+                    vertex: shaders::WALK_VERT.with(&[]),
                     fragment: shaders::WALK_FRAG.with(on),
+                    keeps: Keeps::BlendMarked,
                     ..info
                 };
                 let pipeline = Pipeline::new(&self.gpu, &target, &walked)?;
@@ -268,12 +283,16 @@ impl Shell {
                     .partly_magnified
                     .then(|| Pipeline::new(&self.gpu, &target, &magnified))
                     .transpose()?;
-                let of_several = PipelineInfo { fragment: shaders::TOGETHER_FRAG.with(on), ..walked };
+                let of_several = PipelineInfo {
+                    vertex: shaders::WALK_VERT.with(&["TOGETHER"]),
+                    fragment: shaders::TOGETHER_FRAG.with(on),
+                    ..walked
+                };
                 let together = kind.cycles.then(|| Pipeline::new(&self.gpu, &target, &of_several));
                 let together = together.transpose()?;
                 let rays = RayBuffers::new(&self.gpu, crossings)?;
                 let cells = Buffer::floats(&self.gpu, "the tetrahedra", &seen.cells)?;
-                (cells, Medium::Walked { pipeline, magnified, together, rays })
+                (cells, Medium::Walked { mark, pipeline, magnified, together, rays })
             }
         };
         let solids = self.solids.as_ref().map(|_| {
