@@ -22,6 +22,9 @@ layout(location = 1) out vec4 out_depth; // (distance * alpha, 0, 0, alpha)
 
 void main() {
     vec3 ray = pixel_ray();
+#ifdef LIT
+    look_along(ray);
+#endif
 #ifdef SOLIDS
     farthest = solid_depth();
 #endif

@@ -27,6 +27,9 @@ layout(location = 1) out vec4 out_depth; // (distance * alpha, 0, 0, alpha)
 
 void main() {
     vec3 ray = pixel_ray();
+#ifdef LIT
+    look_along(ray);
+#endif
     vec2 segment = interval(planes, ray);
 #ifdef SOLIDS
     segment.y = min(segment.y, solid_depth());

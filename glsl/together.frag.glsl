@@ -60,6 +60,9 @@ void main() {
     if (!crossings_of(uvec2(gl_FragCoord.xy), first, last, is_begun)) last = first;
     if (first == last) discard;
     vec3 ray = pixel_ray();
+#ifdef LIT
+    look_along(ray);
+#endif
     float per_depth = length(ray) * view.per_opacity_distance;
 #ifdef SOLIDS
     float farthest = solid_depth();

@@ -28,6 +28,9 @@ void main() {
     if (is_intricate) last = next;
     if (next == last) discard;
     vec3 ray = pixel_ray();
+#ifdef LIT
+    look_along(ray);
+#endif
     float per_depth = length(ray) * view.per_opacity_distance;
 #ifdef SOLIDS
     float farthest = solid_depth();

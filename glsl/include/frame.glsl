@@ -8,11 +8,8 @@ layout(set = 0, binding = 3) uniform samplerBuffer frames;
 // Of the tetrahedron that is being marched, affine in depth: `frame_at_eye + z frame_from_depth`.
 mat3 frame_at_eye;
 mat3 frame_from_depth;
-vec3 view_ray; // at unit depth
-
 // Must be called before a point in a tetrahedron is lit.
 void enter(uint index, vec3 ray) {
-    view_ray = ray;
     for (int column = 0; column < 3; column++) {
         for (int row = 0; row < 3; row++) {
             vec4 entry = texelFetch(frames, int(9 * index) + 3 * column + row);

@@ -1,19 +1,21 @@
 // The lights of a scene, and what of them reaches a point. Points are in world space with the origin at the eye, in parts of
 // `Seen::unit`.
 
-// How many; which cast shadows, a bit each; and how many pictures each of those has. Known to the compiler, so that where a loop over
+// How many; which cast shadows, a bit each; how many pictures each of those has; and which shine from a point. Known to the compiler, so that where a loop over
 // lights is unrolled, what is read of them is at places that it knows: lavapipe reads that once for all pixels.
 layout(constant_id = 7) const uint LIGHTS = 0;
 layout(constant_id = 8) const uint CASTING_LOW = 0;
 layout(constant_id = 9) const uint CASTING_HIGH = 0; // from the 33rd light on
 layout(constant_id = 10) const uint PICTURES = 1;
+layout(constant_id = 11) const uint POINTS_LOW = 0; // those that shine from a point, not from infinitely far
+layout(constant_id = 12) const uint POINTS_HIGH = 0;
 
 const uint MOST_LIGHTS = 64;
 const uint MOST_PICTURES = 6 * MOST_LIGHTS;
 
 struct LightSource {
     vec4 place;  // towards it, or where it is; 1 / falloff, 0 where there is none
-    vec4 colour; // the fourth: 0 directional, 1 a point
+    vec4 colour; // and nothing
 };
 
 layout(set = 0, binding = 5, std140) uniform Lighting {
@@ -26,6 +28,10 @@ layout(set = 0, binding = 5, std140) uniform Lighting {
     float glow_from;
     LightSource sources[MOST_LIGHTS];
 } lighting;
+
+bool is_point(uint light) {
+    return (((light < 32 ? POINTS_LOW : POINTS_HIGH) >> (light & 31)) & 1) != 0;
+}
 
 #ifdef SHADOWS
 #include "shadows.glsl"
@@ -47,9 +53,8 @@ uint first_picture(uint light) {
 vec3 arriving(uint index, vec3 point, vec3 off, out vec3 to_light) {
     LightSource light = lighting.sources[index];
     vec3 colour = light.colour.rgb;
-    if (light.colour.w == 0.0) {
-        to_light = light.place.xyz;
-    } else {
+    to_light = light.place.xyz;
+    if (is_point(index)) {
         vec3 way = light.place.xyz - point;
         float distance = length(way);
         to_light = distance > 0.0 ? way / distance : vec3(0.0);
@@ -57,7 +62,7 @@ vec3 arriving(uint index, vec3 point, vec3 off, out vec3 to_light) {
         colour /= 1.0 + falls * falls;
     }
 #ifdef SHADOWS
-    if (casts_shadows(index)) colour *= let_through(first_picture(index), point + off);
+    if (casts_shadows(index)) colour *= let_through(first_picture(index), !is_point(index), point + off);
 #endif
     return colour;
 }

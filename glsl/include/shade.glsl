@@ -12,13 +12,33 @@ layout(set = 0, binding = 9) uniform sampler3D directions; // times their weight
 // A point, as light meets it.
 struct Spot {
     vec3 at;        // in world space around the eye
-    vec3 to_eye;
     vec3 direction; // of the texture, unit length; 0 where it has none
     float agreement;
 };
 
 // Lights that are no loop.
 const uint UNROLLED = 4;
+
+// What is the same all along a ray.
+vec3 world_ray; // at unit depth
+vec3 to_eye;
+vec3 half_ways[UNROLLED]; // between the eye and each light that is infinitely far, unit length or 0
+
+vec3 half_way_to(vec3 to_light) {
+    vec3 sum = to_light + to_eye;
+    float size = length(sum);
+    return size > 0.0 ? sum / size : vec3(0.0);
+}
+
+// Must be called before a point on a ray is lit.
+void look_along(vec3 ray) {
+    world_ray = lighting.world_from_view[0].xyz * ray.x + lighting.world_from_view[1].xyz * ray.y
+        + lighting.world_from_view[2].xyz * ray.z;
+    to_eye = -normalize(world_ray);
+    for (uint i = 0; i < UNROLLED; i++) {
+        if (!FIBRE && i < LIGHTS && !is_point(i)) half_ways[i] = half_way_to(lighting.sources[i].place.xyz);
+    }
+}
 
 // Adds what it scatters and mirrors of a light.
 void add_light(uint light_index, Spot spot, inout vec3 scattered, inout vec3 mirrored) {
@@ -28,14 +48,14 @@ void add_light(uint light_index, Spot spot, inout vec3 scattered, inout vec3 mir
     float aligned;
     float lobe;
     if (FIBRE) {
-        float along_eye = dot(spot.direction, spot.to_eye);
+        float along_eye = dot(spot.direction, to_eye);
         aligned = sqrt(max(1.0 - along * along, 0.0));
         float off_cone = aligned * sqrt(max(1.0 - along_eye * along_eye, 0.0)) - along * along_eye;
         lobe = pow(max(off_cone, 0.0), lighting.shininess);
     } else {
-        vec3 half_way = to_light + spot.to_eye;
-        float half_size = length(half_way);
-        float highlight = half_size > 0.0 ? dot(spot.direction, half_way) / half_size : 0.0;
+        bool is_known = light_index < UNROLLED && !is_point(light_index);
+        vec3 half_way = is_known ? half_ways[min(light_index, UNROLLED - 1)] : half_way_to(to_light);
+        float highlight = dot(spot.direction, half_way);
         aligned = max(along, 0.0);
         lobe = aligned * pow(max(highlight, 0.0), lighting.shininess);
     }
@@ -53,9 +73,7 @@ vec4 lit(vec4 texel, vec4 weighted, float depth) {
     direction = has_direction ? direction / size : vec3(0.0);
     float agreement = has_direction ? min(length(weighted.xyz) / weighted.w, 1.0) : 0.0;
 
-    vec3 ray = lighting.world_from_view[0].xyz * view_ray.x + lighting.world_from_view[1].xyz * view_ray.y
-        + lighting.world_from_view[2].xyz * view_ray.z;
-    Spot spot = Spot(depth * ray, -normalize(ray), direction, agreement);
+    Spot spot = Spot(depth * world_ray, direction, agreement);
     vec3 scattered = lighting.ambient;
     vec3 mirrored = vec3(0.0);
     // UNROLLED by hand: few scenes have more.

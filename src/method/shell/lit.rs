@@ -45,17 +45,18 @@ pub struct LightSource {
     pub colour: [f32; 4],
 }
 
-/// Specialisation constants 7 to 10 of lit shaders, in `glsl/include/lights.glsl`: how many lights, which of them cast shadows, and from
-/// how many pictures.
-pub fn constants<'a>(lights: impl Iterator<Item = &'a Light>, shadows: Option<&Shadows>) -> [u32; 4] {
+/// Specialisation constants 7 to 12 of lit shaders, in `glsl/include/lights.glsl`: how many lights, which of them cast shadows, from
+/// how many pictures, and which shine from a point.
+pub fn constants<'a>(lights: impl Iterator<Item = &'a Light>, shadows: Option<&Shadows>) -> [u32; 6] {
     let mut count = 0;
-    let mut casting = 0u64;
+    let (mut casting, mut points) = (0u64, 0u64);
     for light in lights {
         casting |= u64::from(light.shadow) << count;
+        points |= u64::from(matches!(light.source, Source::Point { .. })) << count;
         count += 1;
     }
-    let pictures = shadows.map_or(1, Shadows::pictures_a_light);
-    [count, casting as u32, (casting >> 32) as u32, pictures as u32]
+    let pictures = shadows.map_or(1, Shadows::pictures_a_light) as u32;
+    [count, casting as u32, (casting >> 32) as u32, pictures, points as u32, (points >> 32) as u32]
 }
 
 /// What does not depend on the view.
@@ -190,15 +191,15 @@ impl Sight<'_> {
         };
         let source = |light: &Light| {
             let colour = light.colour.as_vec3();
-            let (place, kind) = match light.source {
-                Source::Directional { towards } => (towards.as_vec3().extend(0.0), 0.0),
+            let place = match light.source {
+                Source::Directional { towards } => towards.as_vec3().extend(0.0),
                 Source::Point { position, falloff } => {
                     let place = (position - view.camera.eye) / *unit;
                     let per_falloff = falloff.map_or(0.0, |falloff| unit / falloff);
-                    (place.as_vec3().extend(per_falloff as f32), 1.0)
+                    place.as_vec3().extend(per_falloff as f32)
                 }
             };
-            LightSource { place: place.into(), colour: colour.extend(kind).into() }
+            LightSource { place: place.into(), colour: colour.extend(0.0).into() }
         };
         let mut sources: Vec<LightSource> = shading.lights.iter().map(source).collect();
         sources.resize(MOST_LIGHTS, LightSource::zeroed());
