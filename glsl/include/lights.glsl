@@ -48,9 +48,8 @@ uint first_picture(uint light) {
 }
 #endif
 
-// The light that reaches a point, and the unit vector towards it. Its shadow is that of a point `off` it, which is off a surface
-// that would else cast a shadow on itself.
-vec3 arriving(uint index, vec3 point, vec3 off, out vec3 to_light) {
+// What arrives of a light at a point if nothing stands in its way, and the unit vector towards it.
+vec3 shining(uint index, vec3 point, out vec3 to_light) {
     LightSource light = lighting.sources[index];
     vec3 colour = light.colour.rgb;
     to_light = light.place.xyz;
@@ -61,8 +60,15 @@ vec3 arriving(uint index, vec3 point, vec3 off, out vec3 to_light) {
         float falls = distance * light.place.w;
         colour /= 1.0 + falls * falls;
     }
+    return colour;
+}
+
+// The light that reaches a point, and the unit vector towards it. Its shadow is that of a point `off` it, which is off a surface
+// that would else cast a shadow on itself.
+vec3 arriving(uint index, vec3 point, vec3 off, out vec3 to_light) {
+    vec3 colour = shining(index, point, to_light);
 #ifdef SHADOWS
-    if (casts_shadows(index)) colour *= let_through(first_picture(index), !is_point(index), point + off);
+    if (casts_shadows(index)) colour *= let_through(look_for(first_picture(index), point + off, !is_point(index)), !is_point(index));
 #endif
     return colour;
 }

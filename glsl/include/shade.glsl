@@ -11,7 +11,7 @@ layout(set = 0, binding = 9) uniform sampler3D directions; // times their weight
 
 // A point, as light meets it.
 struct Spot {
-    vec3 at;        // in world space around the eye
+    float depth;    // along the ray
     vec3 direction; // of the texture, unit length; 0 where it has none
     float agreement;
 };
@@ -19,10 +19,21 @@ struct Spot {
 // Lights that are no loop.
 const uint UNROLLED = 4;
 
-// What is the same all along a ray.
+// What is the same all along a ray; lavapipe takes nothing out of loops by itself.
 vec3 world_ray; // at unit depth
 vec3 to_eye;
-vec3 half_ways[UNROLLED]; // between the eye and each light that is infinitely far, unit length or 0
+// Of each light that is infinitely far.
+vec3 diffuse[UNROLLED];
+vec3 specular[UNROLLED];
+vec3 half_ways[UNROLLED]; // between the eye and it, unit length or 0
+#ifdef SHADOWS
+vec3 at_eye[UNROLLED];    // in its picture: of the ray's start,
+vec3 from_depth[UNROLLED]; // and its change per unit of depth
+#endif
+
+bool is_known(uint light) {
+    return light < UNROLLED && light < LIGHTS && !is_point(light);
+}
 
 vec3 half_way_to(vec3 to_light) {
     vec3 sum = to_light + to_eye;
@@ -36,14 +47,33 @@ void look_along(vec3 ray) {
         + lighting.world_from_view[2].xyz * ray.z;
     to_eye = -normalize(world_ray);
     for (uint i = 0; i < UNROLLED; i++) {
-        if (!FIBRE && i < LIGHTS && !is_point(i)) half_ways[i] = half_way_to(lighting.sources[i].place.xyz);
+        if (!is_known(i)) continue;
+        vec3 to_light;
+        vec3 light = shining(i, vec3(0.0), to_light);
+        diffuse[i] = light * lighting.diffuse;
+        specular[i] = light * lighting.specular;
+        half_ways[i] = half_way_to(to_light);
+#ifdef SHADOWS
+        if (casts_shadows(i) && PICTURES == 1) {
+            at_eye[i] = in_picture(first_picture(i), vec3(0.0));
+            from_depth[i] = in_picture(first_picture(i), world_ray) - at_eye[i];
+        }
+#endif
     }
 }
 
 // Adds what it scatters and mirrors of a light.
-void add_light(uint light_index, Spot spot, inout vec3 scattered, inout vec3 mirrored) {
+void add_light(uint index, Spot spot, inout vec3 scattered, inout vec3 mirrored) {
     vec3 to_light;
-    vec3 light = arriving(light_index, spot.at, vec3(0.0), to_light);
+    vec3 light = shining(index, spot.depth * world_ray, to_light);
+    vec3 of_diffuse = light * lighting.diffuse;
+    vec3 of_specular = light * lighting.specular;
+    vec3 half_way = half_way_to(to_light);
+    if (is_known(index)) {
+        of_diffuse = diffuse[min(index, UNROLLED - 1)];
+        of_specular = specular[min(index, UNROLLED - 1)];
+        half_way = half_ways[min(index, UNROLLED - 1)];
+    }
     float along = dot(spot.direction, to_light);
     float aligned;
     float lobe;
@@ -53,15 +83,27 @@ void add_light(uint light_index, Spot spot, inout vec3 scattered, inout vec3 mir
         float off_cone = aligned * sqrt(max(1.0 - along_eye * along_eye, 0.0)) - along * along_eye;
         lobe = pow(max(off_cone, 0.0), lighting.shininess);
     } else {
-        bool is_known = light_index < UNROLLED && !is_point(light_index);
-        vec3 half_way = is_known ? half_ways[min(light_index, UNROLLED - 1)] : half_way_to(to_light);
-        float highlight = dot(spot.direction, half_way);
         aligned = max(along, 0.0);
-        lobe = aligned * pow(max(highlight, 0.0), lighting.shininess);
+        lobe = aligned * pow(max(dot(spot.direction, half_way), 0.0), lighting.shininess);
     }
+#ifdef SHADOWS
+    if (casts_shadows(index)) {
+        uint first = first_picture(index);
+        Shown shown = nowhere();
+        if (is_known(index) && PICTURES == 1) {
+            uint known = min(index, UNROLLED - 1);
+            look_in(first, at_eye[known] + spot.depth * from_depth[known], true, shown);
+        } else {
+            shown = look_for(first, spot.depth * world_ray, !is_point(index));
+        }
+        float through = let_through(shown, !is_point(index));
+        of_diffuse *= through;
+        of_specular *= through;
+    }
+#endif
     float mean = FIBRE ? 0.78539816339744831 : 0.25; // pi / 4: see src/scene/shading.rs
-    scattered += light * (lighting.diffuse * mix(mean, aligned, spot.agreement));
-    mirrored += light * (lighting.specular * spot.agreement * lobe);
+    scattered += of_diffuse * mix(mean, aligned, spot.agreement);
+    mirrored += of_specular * (spot.agreement * lobe);
 }
 
 // A texel as it is lit, with its weighted direction: its alpha, and the colour that it sends to the eye, premultiplied as before.
@@ -73,7 +115,7 @@ vec4 lit(vec4 texel, vec4 weighted, float depth) {
     direction = has_direction ? direction / size : vec3(0.0);
     float agreement = has_direction ? min(length(weighted.xyz) / weighted.w, 1.0) : 0.0;
 
-    Spot spot = Spot(depth * world_ray, direction, agreement);
+    Spot spot = Spot(depth, direction, agreement);
     vec3 scattered = lighting.ambient;
     vec3 mirrored = vec3(0.0);
     // UNROLLED by hand: few scenes have more.

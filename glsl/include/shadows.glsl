@@ -30,28 +30,47 @@ float transmittance_until(vec2 at, float depth) {
     return opacity_of_all == 0.0 ? 1.0 : 1.0 - min(done * growth, opacity_of_all);
 }
 
-// Of a light whose pictures begin at `first`, and show parallel rays or not.
-float let_through(uint first, bool is_parallel, vec3 point) {
-    // Where the point is in the picture that it is in, if in any.
-    vec3 place = vec3(0.0);
-    vec2 corner = vec2(0.0);
-    bool is_seen = false;
-    for (uint i = 0; i < PICTURES; i++) {
-        LightPicture light = light_pictures[first + i];
-        vec4 at = vec4(point, 1.0);
-        vec3 there = vec3(dot(light.from_world[0], at), dot(light.from_world[1], at), dot(light.from_world[2], at));
-        if (!is_parallel) there.xy /= there.z;
-        there.y = -there.y;
-        bool is_before = is_parallel || there.z > 0.0;
-        // Four pixels of it are read.
-        if (!is_seen && is_before && max(abs(there.x), abs(there.y)) <= light.half_side - 1.0) {
-            place = there;
-            corner = light.middle + there.xy - 0.5;
-            is_seen = true;
-        }
+// The pixel beside its middle, to the right and upwards, and depth of a point, in a light's picture; of one that shows no parallel rays
+// the pixel times the depth.
+vec3 in_picture(uint index, vec3 point) {
+    LightPicture light = light_pictures[index];
+    vec4 at = vec4(point, 1.0);
+    return vec3(dot(light.from_world[0], at), dot(light.from_world[1], at), dot(light.from_world[2], at));
+}
+
+// Where a point is in a light's picture that it is in, if in any.
+struct Shown {
+    vec3 place;  // the pixel beside the middle, to the right and downwards, and the depth
+    vec2 corner; // of the image, half a pixel up and left of it
+    bool is_seen;
+};
+
+Shown nowhere() {
+    return Shown(vec3(0.0), vec2(0.0), false);
+}
+
+void look_in(uint index, vec3 there, bool is_parallel, inout Shown shown) {
+    LightPicture light = light_pictures[index];
+    if (!is_parallel) there.xy /= there.z;
+    there.y = -there.y;
+    bool is_before = is_parallel || there.z > 0.0;
+    // Four pixels of it are read.
+    if (!shown.is_seen && is_before && max(abs(there.x), abs(there.y)) <= light.half_side - 1.0) {
+        shown = Shown(there, light.middle + there.xy - 0.5, true);
     }
-    vec2 low = floor(corner);
-    vec2 part = corner - low;
+}
+
+// Of a light whose pictures begin at `first`, and show parallel rays or not.
+Shown look_for(uint first, vec3 point, bool is_parallel) {
+    Shown shown = nowhere();
+    for (uint i = 0; i < PICTURES; i++) look_in(first + i, in_picture(first + i, point), is_parallel, shown);
+    return shown;
+}
+
+float let_through(Shown shown, bool is_parallel) {
+    vec3 place = shown.place;
+    vec2 low = floor(shown.corner);
+    vec2 part = shown.corner - low;
     vec2 pixel = 1.0 / vec2(textureSize(curves, 0).xy);
     float sum = 0.0;
     for (int j = 0; j < 4; j++) {
@@ -65,5 +84,5 @@ float let_through(uint first, bool is_parallel, vec3 point) {
 #endif
         sum += weights.x * weights.y * through;
     }
-    return is_seen ? sum : 1.0; // beside all that could stand in the way
+    return shown.is_seen ? sum : 1.0; // beside all that could stand in the way
 }
