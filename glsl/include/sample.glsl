@@ -81,6 +81,12 @@ uint sample_count(Path path, float entry, float exit) {
 
 #ifdef SPARSE
 layout(set = 0, binding = 22) uniform sampler3D proximity; // of src/volume/proximity.rs, in parts of 255: to what is not empty or even
+
+// At a point of the texture, in texels of a level.
+float distance_at(vec3 point, float level) {
+    uint both = uint(round(255.0 * textureLod(proximity, point, MINIFIED ? max(level, 0.0) : 0.0).x));
+    return float(MINIFIED ? both >> 4 : both & 15);
+}
 #endif
 
 // A segment in equal steps.
@@ -149,7 +155,7 @@ void pass_evenly(float begin, float end, uint steps) {
 bool are_even(Path path, Steps steps) {
     float along = 0.5 * float(steps.count);
     vec3 point = path.at_eye + (steps.begin + along * steps.size) * path.from_depth;
-    float distance = round(255.0 * textureLod(proximity, point, max(steps.level, 0.0)).x);
+    float distance = distance_at(point, steps.level);
     return steps.level >= 0.0 && (distance - 1.0) * steps.per_texel >= along;
 }
 #endif
@@ -179,7 +185,7 @@ uint seek(Path path, Steps steps, uint i, inout uint passes) {
     // It has two ends: see `march_midpoints`.
     for (; i < steps.count;) {
         vec3 point = path.at_eye + middle(steps, i) * path.from_depth;
-        float distance = round(255.0 * textureLod(proximity, point, max(steps.level, 0.0)).x);
+        float distance = distance_at(point, steps.level);
         passes++;
         bool is_near = distance == 0.0 || steps.level < 0.0;
         uint leap = is_near ? 0 : 1 + uint((distance - 1.0) * steps.per_texel);

@@ -9,8 +9,11 @@ use rayon::prelude::*;
 
 use super::{Directions, Pyramid, Quantity, Volume};
 
-/// No distance is more, in texels. Longer leaps save little: each spares but one more look.
-const FARTHEST: u8 = 16;
+/// No distance is more, in texels: two fit into a byte. Longer leaps save little: each spares but one more look.
+const FARTHEST: u8 = 15;
+
+/// Of a distance.
+const BITS: u32 = 4;
 
 /// Distances of places to what is unlike the rest, for each level of a [`Pyramid`].
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -24,9 +27,10 @@ pub struct Proximity {
 pub struct ProximityLevel {
     /// As that of the level: texels along u, v, w.
     pub size: [u32; 3],
-    /// Of each texel's box, u fastest, then v, then w: 0 where a sample in it may read a texel unlike the rest, at this level, the next
-    /// finer or the next coarser; else the distance, in texels of this level along the axis where it is greatest, of the nearest box
-    /// where one may. u and v repeat. At most 16, also where there is none.
+    /// Of each texel's box, u fastest, then v, then w: 0 where a sample in it may read a texel unlike the rest; else the distance, in
+    /// texels of this level along the axis where it is greatest, of the nearest box where one may. u and v repeat. At most 15, also where
+    /// there is none. In the low four bits of samples of this level alone; in the high ones of those of this and the next coarser, or
+    /// the next finer and this.
     pub distances: Vec<u8>,
 }
 
@@ -44,21 +48,26 @@ impl Proximity {
         let levels = 0..pyramid.levels.len();
         let levels = levels.map(|level| {
             let size = pyramid.levels[level].size;
-            let mut near = vec![0; unlike[level].len()];
-            let read = level.saturating_sub(1)..pyramid.levels.len().min(level + 2);
-            for (unlike, of) in unlike[read.clone()].iter().zip(&pyramid.levels[read]) {
-                let within = reached(unlike, of.size, size);
-                near.iter_mut().zip(within).for_each(|(near, within)| *near |= within);
+            let within =
+                |other: usize| reached(&unlike[other], pyramid.levels[other].size, size);
+            let alone = within(level);
+            let mut near = alone.clone();
+            let beside = [level.checked_sub(1), Some(level + 1).filter(|&next| next < pyramid.levels.len())];
+            for other in beside.into_iter().flatten() {
+                near.iter_mut().zip(within(other)).for_each(|(near, within)| *near |= within);
             }
-            ProximityLevel { size, distances: distances(&near, size) }
+            let mut distances = distances(&alone, size);
+            let blended = self::distances(&near, size);
+            distances.iter_mut().zip(blended).for_each(|(alone, blended)| *alone |= blended << BITS);
+            ProximityLevel { size, distances }
         });
         Self { levels: levels.collect() }
     }
 
-    /// The part, 0..1, of the full volume's boxes in which all is like the rest.
+    /// The part, 0..1, of the full volume's boxes in which all of it is like the rest.
     pub fn part(&self) -> f64 {
         let distances = &self.levels[0].distances;
-        distances.iter().filter(|distance| **distance > 0).count() as f64 / distances.len() as f64
+        distances.iter().filter(|distance| **distance & FARTHEST > 0).count() as f64 / distances.len() as f64
     }
 }
 
