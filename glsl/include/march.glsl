@@ -15,10 +15,6 @@ const float LEAST = 1e-30;
 #define radiant fetch // unlit, a texel's colour is what it sends out
 #endif
 
-#if defined(LIT) && defined(SPARSE) && !defined(EVEN)
-#define LIT_SPARSE
-#endif
-
 // Passes through loops that one costs: its own, and one for each light that is not unrolled.
 #ifdef LIT
 const uint PASSES_A_SAMPLE = LIGHTS > UNROLLED ? 1 + LIGHTS - UNROLLED : 1;
@@ -30,25 +26,6 @@ const uint PASSES_A_SAMPLE = 1;
 vec3 emitted(vec4 texel, float amount) {
     return texel.a > LEAST ? texel.rgb * (amount / texel.a) : vec3(0.0);
 }
-
-#ifdef LIT_SPARSE
-// On from sample `i` to the next in which something is, at depth `z`; where there is none, past the last, and nothing. To light a
-// texel costs several times what it costs to read one, and of eight pixels that run at once each finds its own before all are lit.
-vec4 next_seen(Path path, Steps steps, inout uint i, out float z, inout uint passes) {
-    vec4 texel = vec4(0.0);
-    z = 0.0;
-    // It has two ends: see `march_midpoints`.
-    for (; i < steps.count;) {
-        passes++;
-        z = middle(steps, i);
-        texel = fetch(path, z);
-        if (texel.a > LEAST) break;
-        i = seek(path, steps, i + 1, passes);
-        if (i >= steps.count) break;
-    }
-    return texel;
-}
-#endif
 
 // How far into a path of an optical depth through a medium that is the same everywhere, in parts of it, the mean of what is sent out
 // comes from: `1 / t - exp(-t) / (1 - exp(-t))`. Below 1/2 the series, whose first term left out is t^5 / 30240 < 2^-19.
@@ -77,14 +54,6 @@ void march_midpoints(Path path, Steps steps, inout uint i, float per_depth, inou
     // Where several pixels run at once, a test at the end costs no pass that nobody needs; but a loop whose only end that is lavapipe
     // 22.3 gets wrong: what a pixel that is done has summed is summed again, in part, as the others go on. So it has another at the top.
     for (; i < steps.count || even_waits();) {
-#ifdef LIT_SPARSE
-        float z;
-        vec4 texel = next_seen(path, steps, i, z, passes);
-        texel = lit(texel, fetch_from(directions, path, z), z);
-        float optical = extinction(texel) * max(steps.size * per_depth, LEAST);
-        float alpha = opacity(optical);
-        i++;
-#else
         Part part = next_part(steps, i);
         float z = part.middle;
         vec4 texel = fetch(path, z);
@@ -98,7 +67,6 @@ void march_midpoints(Path path, Steps steps, inout uint i, float per_depth, inou
 #endif
 #ifdef LIT
         texel = lit(texel, part.is_even ? vec4(0.0) : fetch_from(directions, path, z), z);
-#endif
 #endif
         light.depth += transmittance(light.gathered) * alpha * z;
         lay_behind(light.gathered, vec4(emitted(texel, alpha), alpha));

@@ -48,8 +48,7 @@ impl Proximity {
         let levels = 0..pyramid.levels.len();
         let levels = levels.map(|level| {
             let size = pyramid.levels[level].size;
-            let within =
-                |other: usize| reached(&unlike[other], pyramid.levels[other].size, size);
+            let within = |other: usize| reached(&unlike[other], pyramid.levels[other].size, size);
             let alone = within(level);
             let mut near = alone.clone();
             let beside = [level.checked_sub(1), Some(level + 1).filter(|&next| next < pyramid.levels.len())];
