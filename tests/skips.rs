@@ -10,7 +10,7 @@ use mesoshell::frame::Frame;
 use mesoshell::method::Choice;
 use mesoshell::metric;
 use mesoshell::progress::Silent;
-use mesoshell::scene::{self, March, Scene, Skip, Skips, Traversal};
+use mesoshell::scene::{self, Light, March, Scene, Shading, Skip, Skips, Traversal};
 
 fn load(name: &str, overrides: &[&str]) -> Scene {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(name).with_extension("toml");
@@ -23,8 +23,13 @@ fn load(name: &str, overrides: &[&str]) -> Scene {
 
 /// With it, and with it switched off; and what was chosen about it.
 fn with_and_without(skip: Skip, scene: &Scene) -> [(Frame, Choice); 2] {
-    [Skips::default(), Skips::without(&[skip])].map(|skips| {
-        let scene = Arc::new(Scene { skips, ..scene.clone() });
+    with_and_without_of(skip, scene, &[])
+}
+
+/// The same with others switched off, too.
+fn with_and_without_of(skip: Skip, scene: &Scene, off: &[Skip]) -> [(Frame, Choice); 2] {
+    [off.to_vec(), [off, &[skip]].concat()].map(|off| {
+        let scene = Arc::new(Scene { skips: Skips::without(&off), ..scene.clone() });
         let mut method = Watched::prepare("shell", &scene);
         let choice = method.plan().into_iter().find(|choice| choice.about == skip.name()).unwrap();
         (method.render(&scene.view), choice)
@@ -42,6 +47,8 @@ fn difference([a, b]: [&Frame; 2]) -> f64 {
 
 #[test]
 fn leaps_change_nothing() {
+    // Whether a ray ends is asked after every few samples, and leaps leave some out.
+    let leap = |scene: &Scene| with_and_without_of(Skip::EmptySpace, scene, &[Skip::Saturation]);
     let plans =
         [(March::Default { step: 0.5 }, Traversal::Walk), (March::Default { step: 0.3 }, Traversal::Sort)];
     // From ever farther away: coarser levels are read, and several in one tetrahedron.
@@ -49,7 +56,7 @@ fn leaps_change_nothing() {
         let scene = load("lit-rocks", &[eye]);
         for (march, traversal) in plans {
             let scene = Scene { march, traversal, ..scene.clone() };
-            let [with, without] = with_and_without(Skip::EmptySpace, &scene);
+            let [with, without] = leap(&scene);
             assert_eq!((with.1.chosen, without.1.chosen), ("on", "off"), "{with:?}");
             let covered = with.0.report.counts["pixels_covered"];
             assert!(covered > 80, "{eye}: {covered}");
@@ -57,23 +64,47 @@ fn leaps_change_nothing() {
         }
     }
     // Neighbouring pixels read different levels.
-    let [with, without] =
-        with_and_without(Skip::EmptySpace, &load("animation/flag", &["image.size=[384, 256]"]));
+    let [with, without] = leap(&load("animation/flag", &["image.size=[384, 256]"]));
     assert_eq!(with.1.chosen, "on");
     assert_eq!(difference([&with.0, &without.0]), 0.0);
     // Rays of lights, which are parallel or come from a point.
     for light in ["direction = [-0.8, -0.5, 0.45]", "position = [1, 2, -1]"] {
         let of_shadows = ["shading.shadow_size=128", &format!("light=[{{ {light}, shadow = true }}]")];
-        let [with, without] = with_and_without(Skip::EmptySpace, &load("effects/shadow", &of_shadows));
+        let [with, without] = leap(&load("effects/shadow", &of_shadows));
         assert_eq!(with.1.chosen, "on");
         assert_eq!(difference([&with.0, &without.0]), 0.0, "{light}");
     }
     let papers = Scene { march: March::Paper { samples: 10 }, ..load("lit-rocks", &[]) };
-    assert_eq!(
-        with_and_without(Skip::EmptySpace, &papers)[0].1.chosen,
-        "off",
-        "the yardstick is the paper's"
-    );
+    assert_eq!(leap(&papers)[0].1.chosen, "off", "the yardstick is the paper's");
+}
+
+#[test]
+fn what_is_even_is_passed_in_long_steps() {
+    let haze = load("table1/vase-dragons", &["image.size=[128, 96]", "shading.shadow_size=128"]);
+    let shading = haze.shading.clone().unwrap();
+    let shadowless = Shading {
+        lights: shading.lights.iter().map(|light| Light { shadow: false, ..*light }).collect(),
+        ..shading.clone()
+    };
+    let compare = |scene: &Scene| {
+        let [with, without] = with_and_without(Skip::EvenSpace, scene);
+        assert_eq!((with.1.chosen, without.1.chosen), ("on", "off"), "{with:?}");
+        metric::compare(&with.0.image, &without.0.image).unwrap()
+    };
+    for traversal in [Traversal::Walk, Traversal::Sort] {
+        // Sums of as many terms, each rounded to f32: a few hundred steps, of 2^-24 each.
+        for shading in [None, Some(shadowless.clone())] {
+            let difference = compare(&Scene { shading, traversal, ..haze.clone() });
+            assert!(difference.max <= 2e-5, "{traversal:?}: {difference:?}");
+        }
+        // What docs/speed.md says, and on a picture that small as much again.
+        let difference = compare(&Scene { traversal, ..haze.clone() });
+        assert!(difference.rmse > 0.0 && difference.rmse <= 2e-4, "{traversal:?}: {difference:?}");
+    }
+    // Several parts of the shell at once.
+    let together = load("table1/teapot-bust", &["shading.shadow_size=128"]);
+    let difference = compare(&Scene { shading: None, ..together });
+    assert!(difference.max <= 2e-5, "{difference:?}");
 }
 
 #[test]

@@ -206,94 +206,140 @@ fn spread(boxes: &[u8], size: [u32; 3], axis: usize) -> Boxes {
 
 #[cfg(test)]
 mod tests {
+    use glam::DVec3;
     use rand::RngExt as _;
     use rand_pcg::Pcg64;
 
     use super::*;
-    use crate::volume::Quantity;
+    use crate::volume::texel_at;
 
-    fn pyramid(size: [u32; 3], seen: impl Fn([u32; 3]) -> bool) -> Pyramid {
-        let [width, height, depth] = size;
-        let places =
-            (0..depth).flat_map(|w| (0..height).flat_map(move |v| (0..width).map(move |u| [u, v, w])));
-        let texels = places.map(|place| if seen(place) { [0.5; 4] } else { [0.0; 4] }).collect();
-        Pyramid::build(Volume::of(Quantity::Opacity, size, texels).unwrap())
+    const NOTHING: [f32; 4] = [0.0; 4];
+    const HAZE: [f32; 4] = [0.03, 0.02, 0.05, 0.07];
+
+    /// Of texels that are all `rest` but for some.
+    fn pyramid(size: [u32; 3], rest: [f32; 4], is_other: impl Fn([u32; 3]) -> bool) -> Pyramid {
+        let count = size.iter().product::<u32>() as usize;
+        let texel = |index| if is_other(texel_at(size, index)) { [0.5; 4] } else { rest };
+        Pyramid::build(Volume::of(Quantity::Opacity, size, (0..count).map(texel).collect()).unwrap())
     }
 
-    /// Whether linear interpolation finds anything: u and v repeat, w clamps.
-    fn sees(level: &Volume, point: [f64; 3]) -> bool {
+    /// What linear interpolation reads: u and v repeat, w clamps.
+    fn read(level: &Volume, point: [f64; 3]) -> impl Iterator<Item = [f32; 4]> {
         let read = [0, 1, 2].map(|k| {
             let side = i64::from(level.size[k]);
             let low = (point[k] * side as f64 - 0.5).floor() as i64;
             let index = |i: i64| if k < 2 { i.rem_euclid(side) } else { i.clamp(0, side - 1) };
             [index(low) as u32, index(low + 1) as u32]
         });
-        let [u, v, w] = read;
-        w.iter().any(|&w| v.iter().any(|&v| u.iter().any(|&u| level.texel([u, v, w])[3] > 0.0)))
+        let corner = move |corner: usize| [0, 1, 2].map(|k| read[k][corner >> k & 1]);
+        (0..8).map(move |index| level.texel(corner(index)))
     }
 
-    /// Places from which something is seen, at any of the levels that a sample may read, before a ray has gone `promised` of the
-    /// distance there, wherever that is and however the ray runs.
-    fn broken_promises(promised: impl Fn(u8) -> f64) -> usize {
+    /// Places from which a texel unlike the rest is read, at any of the levels that a sample may read, before a ray has gone `promised` of
+    /// the distance there, wherever that is and however the ray runs.
+    fn broken_promises(rest: [f32; 4], promised: impl Fn(u8) -> f64) -> usize {
         let mut random = Pcg64::new(7, 11);
         let mut broken = 0;
         let sizes =
             [[32, 32, 16], [20, 33, 9], [64, 7, 1], [40, 24, 8], [30, 50, 4], [24, 24, 5], [48, 31, 2]];
         // The last layer along w, too: it is clamped there.
         for (size, last) in sizes.into_iter().flat_map(|size| [(size, false), (size, true)]) {
-            let mut seen = size.map(|side| random.random_range(0..side));
-            seen[2] = if last { size[2] - 1 } else { seen[2] };
-            let pyramid = pyramid(size, |place| place == seen);
-            let proximity = Proximity::new(&pyramid, None, [0.0; 4]);
-            let mut leaps = 0;
+            let mut other = size.map(|side| random.random_range(0..side));
+            other[2] = if last { size[2] - 1 } else { other[2] };
+            let pyramid = pyramid(size, rest, |place| place == other);
+            let proximity = Proximity::new(&pyramid, None, rest);
+            let mut leaps = [0, 0];
             for _ in 0..10_000 {
                 let level = random.random_range(0..pyramid.levels.len());
                 let of = &proximity.levels[level];
                 assert_eq!(of.size, pyramid.levels[level].size);
                 let point: [f64; 3] = std::array::from_fn(|_| random.random_range(0.0..1.0));
                 let [u, v, w] = [0, 1, 2].map(|k| (point[k] * f64::from(of.size[k])).floor() as usize);
-                let distance = of.distances[(w * of.size[1] as usize + v) * of.size[0] as usize + u];
-                if distance == 0 {
-                    continue;
+                let both = of.distances[(w * of.size[1] as usize + v) * of.size[0] as usize + u];
+                let kinds = [
+                    (both & FARTHEST, level..level + 1),
+                    (both >> BITS, level.saturating_sub(1)..pyramid.levels.len().min(level + 2)),
+                ];
+                for ((distance, levels), leaps) in kinds.into_iter().zip(&mut leaps) {
+                    if distance == 0 {
+                        continue;
+                    }
+                    *leaps += 1;
+                    let within = promised(distance);
+                    let mut moved = [0, 1, 2]
+                        .map(|k| point[k] + random.random_range(-within..=within) / f64::from(of.size[k]));
+                    moved[2] = moved[2].clamp(0.0, 1.0);
+                    let differs = |level: usize| {
+                        read(&pyramid.levels[level], moved).any(|texel| !is_like(&texel, &rest))
+                    };
+                    broken += usize::from(levels.into_iter().any(differs));
                 }
-                leaps += 1;
-                let within = promised(distance);
-                let mut moved = [0, 1, 2]
-                    .map(|k| point[k] + random.random_range(-within..=within) / f64::from(of.size[k]));
-                moved[2] = moved[2].clamp(0.0, 1.0);
-                let read = level.saturating_sub(1)..pyramid.levels.len().min(level + 2);
-                broken += usize::from(read.into_iter().any(|other| sees(&pyramid.levels[other], moved)));
             }
-            assert!(leaps > 100, "{size:?}: {leaps}");
+            assert!(leaps.iter().all(|&leaps| leaps > 100), "{size:?}: {leaps:?}");
         }
         broken
     }
 
     #[test]
-    fn nothing_is_seen_within_the_distance() {
-        assert_eq!(broken_promises(|distance| f64::from(distance - 1)), 0);
-        assert!(broken_promises(|distance| f64::from(distance + 2)) > 20);
+    fn nothing_else_is_read_within_the_distance() {
+        for rest in [NOTHING, HAZE] {
+            assert_eq!(broken_promises(rest, |distance| f64::from(distance - 1)), 0);
+            assert!(broken_promises(rest, |distance| f64::from(distance + 2)) > 20);
+        }
     }
 
     #[test]
     fn distances_are_those_of_the_greatest_axis_and_u_and_v_repeat() {
-        let full = pyramid([40, 40, 40], |place| place == [1, 20, 30]);
-        let level = &Proximity::new(&full, None, [0.0; 4]).levels[0];
+        let full = pyramid([40, 40, 40], NOTHING, |place| place == [1, 20, 30]);
+        let level = &Proximity::new(&full, None, NOTHING).levels[0];
         let at = |u: usize, v: usize, w: usize| level.distances[(w * 40 + v) * 40 + u];
         // The texel is read in the boxes beside its own, and half a coarser texel farther: one box more.
         assert_eq!(at(1, 20, 30), 0);
-        let nearest = (2..10).find(|&u| at(u, 20, 30) > 0).unwrap();
+        assert_eq!([at(2, 20, 30) & FARTHEST, at(3, 20, 30) & FARTHEST], [0, 1]);
+        let nearest = (2..10).find(|&u| at(u, 20, 30) >> BITS > 0).unwrap();
         assert!((3..=5).contains(&nearest), "{nearest}");
-        assert_eq!(at(nearest + 4, 20, 30), 5);
-        assert_eq!(at(nearest + 4, 22, 33), 5);
+        assert_eq!(at(nearest + 4, 20, 30) >> BITS, 5);
+        assert_eq!(at(nearest + 4, 22, 33) >> BITS, 5);
         // Round the other way.
-        assert!((1..=7).contains(&at(36, 20, 30)), "{}", at(36, 20, 30));
-        assert_eq!(at(20, 0, 0), FARTHEST);
+        assert!((1..=7).contains(&(at(36, 20, 30) >> BITS)), "{}", at(36, 20, 30));
+        assert_eq!(at(20, 0, 0), FARTHEST | FARTHEST << BITS);
     }
 
     #[test]
     fn a_dense_volume_is_near_everywhere() {
-        assert_eq!(Proximity::new(&pyramid([8, 8, 8], |_| true), None, [0.0; 4]).part(), 0.0);
-        assert_eq!(Proximity::new(&pyramid([8, 8, 8], |_| false), None, [0.0; 4]).part(), 1.0);
+        let part = |is_other: fn([u32; 3]) -> bool| {
+            Proximity::new(&pyramid([8, 8, 8], NOTHING, is_other), None, NOTHING).part()
+        };
+        assert_eq!((part(|_| true), part(|_| false)), (0.0, 1.0));
+    }
+
+    #[test]
+    fn what_has_a_direction_is_unlike_the_rest() {
+        let size = [8, 8, 8];
+        let volume = pyramid(size, HAZE, |_| false);
+        let directions =
+            Directions::of(&volume.levels[0], |at| if at == [2, 3, 4] { DVec3::Z } else { DVec3::ZERO });
+        let all = Proximity::new(&volume, None, HAZE);
+        let some = Proximity::new(&volume, Some(&directions), HAZE);
+        assert_eq!(all.part(), 1.0);
+        // In 27 boxes of 512 it is read.
+        assert_eq!(some.part(), 485.0 / 512.0);
+        assert_eq!(some.levels[0].distances[(4 * 8 + 3) * 8 + 2], 0);
+    }
+
+    #[test]
+    fn the_commonest_medium_is_neither_nothing_nor_a_wall() {
+        let size = [16, 16, 16];
+        let fill = |index: usize| match index % 8 {
+            0..3 => NOTHING,
+            3..6 => [0.2, 0.2, 0.2, 1.0],
+            6 => HAZE,
+            _ => [0.0, 0.0, 0.0, 1e-6 * index as f32],
+        };
+        let volume = Volume::of(Quantity::Opacity, size, (0..4096).map(fill).collect()).unwrap();
+        assert_eq!(commonest(&volume), Some(HAZE));
+        assert_eq!(part_like(&volume, HAZE), 0.125);
+        assert_eq!(part_like(&volume, NOTHING), 0.375);
+        assert_eq!(commonest(&Volume::of(Quantity::Opacity, size, vec![NOTHING; 4096]).unwrap()), None);
     }
 }
