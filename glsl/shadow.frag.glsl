@@ -15,6 +15,8 @@
 
 layout(location = 1) flat in uint picture;
 
+const uint AT_A_TIME = 3; // samples, before other pixels' rays go on: see march.glsl
+
 void main() {
     LightPicture light = light_pictures[picture];
     int next;
@@ -32,22 +34,24 @@ void main() {
     float per_depth = length(ray.along) * light.opacity_distances;
     uint passes = 0;
     Walker walker = walker_at(next, last, is_begun, ray.along, passes);
+    Stretch stretch = nothing_passed();
     while (!walker.strays && passes < MOST_PASSES) {
-        Stretch stretch = go_on(walker, ray.along, ray.farthest, passes);
+        if (stretch.first >= stretch.steps.count) stretch = go_on(walker, ray.along, ray.farthest, passes);
         Steps steps = stretch.steps;
+        uint taken = 0;
         // It has two ends: see `march_midpoints`.
-        for (uint i = stretch.first; i < steps.count || even_waits();) {
-            Part part = next_part(steps, i);
+        for (; stretch.first < steps.count || even_waits();) {
+            Part part = next_part(steps, stretch.first);
             vec4 texel = fetch(stretch.path, part.middle);
 #ifdef EVEN
             if (part.is_even) texel = view.even;
 #endif
             dim(part.begin, part.size, extinction(texel) * max(part.size * per_depth, LEAST));
             passes += PASSES_A_SAMPLE;
-            i = seek(stretch.path, steps, i, passes);
-            if (i >= steps.count) break;
+            stretch.first = seek(stretch.path, steps, stretch.first, passes);
+            if (stretch.first >= steps.count || ++taken == AT_A_TIME) break;
         }
-        if ((walker.is_done && !even_waits()) || is_dark()) break;
+        if ((walker.is_done && stretch.first >= steps.count && !even_waits()) || is_dark()) break;
     }
     if (is_left || walker.strays || passes >= MOST_PASSES) discard;
     write_curve();

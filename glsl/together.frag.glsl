@@ -53,6 +53,8 @@ bool leaves_by(uint exit, float depth, int first, int last, vec3 ray) {
     return false;
 }
 
+const uint AT_A_TIME = 3; // of what walkers add, before other pixels' rays go on: see march.glsl
+
 void main() {
     int first;
     int last;
@@ -179,7 +181,7 @@ void main() {
             }
 #endif
         }
-        if (step_index < steps || even_waits()) {
+        for (uint taken = 0; step_index < steps || even_waits();) {
             // What one walker adds to a step, or all that was even.
             uint cell = places[walker] >> 2;
             float size = (stop - begin) / float(max(steps, 1u));
@@ -219,6 +221,7 @@ void main() {
             light.depth += transmittance(light.gathered) * mixed.a * z;
             lay_behind(light.gathered, mixed);
             passes += PASSES_A_SAMPLE;
+            if (++taken == AT_A_TIME || (step_index == steps && !even_waits())) break;
         }
         if ((is_done && !even_waits()) || transmittance(light.gathered) <= SATURATED) break;
     }

@@ -169,9 +169,13 @@ fn a_draw_whose_parts_do_not_fit_reaches_no_device() {
         assert!(!draws(&target(gpu, 1), &[&own; 3], bytes - 4), "push constants are missing");
         assert!(!draws(&target(&other, 1), &[&own; 3], bytes), "another device's target");
         assert!(!draws(&target(gpu, 1), &[&own, &own, &foreign], bytes), "another device's buffer");
-        let nearest = Target::sampled(gpu, "surfaces", [4, 4], 1, true).unwrap();
-        let wrong = || Pipeline::new(gpu, &nearest, &shell_pipeline(bytes as u32));
-        assert!(catch_unwind(AssertUnwindSafe(wrong)).is_err(), "a target that keeps the nearest");
+        for keeps in [Keeps::Nearest, Keeps::Marks, Keeps::BlendMarked] {
+            let info = PipelineInfo { keeps, ..shell_pipeline(bytes as u32) };
+            let wrong = || Pipeline::new(gpu, &target(gpu, 1), &info);
+            assert!(catch_unwind(AssertUnwindSafe(wrong)).is_err(), "{keeps:?}: the target has no depths");
+        }
+        let marked = Target::new(gpu, [4, 4], 1, true).unwrap();
+        assert!(!draws(&marked, &[&own; 3], bytes), "a pipeline for targets without marks");
     });
 }
 

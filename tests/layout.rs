@@ -134,7 +134,7 @@ fn bindings(shader: Spirv) -> Vec<u32> {
 #[test]
 fn nothing_is_compiled_in_that_a_scene_does_not_need() {
     let words = |shader: Spirv| String::from_utf8_lossy(bytemuck::cast_slice(shader.words())).into_owned();
-    let of_light: &[&str] = &["radiant", "frames", "lighting", "directions", "FIBRE", "GLOW"];
+    let of_light: &[&str] = &["look_along", "frames", "lighting", "directions", "FIBRE", "GLOW"];
     let of_shadows: &[&str] = &["light_pictures", "curves", "let_through"];
     let of_solids: &[&str] = &["solid_depth", "solid_depths"];
     let of_depth: &[&str] = &["out_depth"];
@@ -144,6 +144,11 @@ fn nothing_is_compiled_in_that_a_scene_does_not_need() {
     for family in families {
         let (without, with) = (words(family.with(&[])), words(family.with(&["SPARSE"])));
         assert!(of_leaps.iter().all(|name| !without.contains(name) && with.contains(name)));
+    }
+    for family in [&shaders::SHELL_FRAG, &shaders::WALK_FRAG, &shaders::TOGETHER_FRAG, &shaders::SHADOW_FRAG]
+    {
+        let (without, with) = (words(family.with(&["SPARSE"])), words(family.with(&["SPARSE", "EVEN"])));
+        assert!(!without.contains("pass_evenly") && with.contains("pass_evenly"));
     }
     for family in [&shaders::SHELL_FRAG, &shaders::CYCLE_FRAG, &shaders::WALK_FRAG, &shaders::TOGETHER_FRAG] {
         let switches =

@@ -23,8 +23,8 @@ use super::{Skip, Traversal};
 use crate::mesh::generate::Generator;
 use crate::mesh::projection::Projection;
 use crate::value::{
-    BelowOne, Colour, Exactly, FieldOfView, Finite, Fraction, Frames, NotNegative, PictureSize, Pixels,
-    Positive, Rate, Rounds, Samples, ShadowSize, Shininess, Step, Stops,
+    BelowOne, Colour, EndBelow, Exactly, FieldOfView, Finite, Fraction, Frames, NotNegative, PictureSize,
+    Pixels, Positive, Rate, Rounds, Samples, ShadowSize, Shininess, Step, Stops,
 };
 use crate::volume::{Filter, TransferFunction};
 
@@ -303,6 +303,8 @@ pub struct MarchSection {
     pub samples: Samples,
     /// See [`Traversal`].
     pub traversal: Traversal,
+    /// See [`Scene::end_below`](super::Scene::end_below).
+    pub end_below: EndBelow,
     /// What is not left out although it could be.
     pub no_skip: Vec<Skip>,
 }
@@ -378,6 +380,7 @@ impl Default for MarchSection {
             step: Step(0.5),
             samples: Samples(10),
             traversal: Traversal::default(),
+            end_below: EndBelow(super::END_BELOW),
             no_skip: Vec::new(),
         }
     }
@@ -497,7 +500,7 @@ recipe = "fog.toml"
                 found += 1;
             }
         }
-        assert_eq!(found, 8 + 12 + 6 + 3 + 5 + 10 + 2 + 3);
+        assert_eq!(found, 8 + 12 + 6 + 3 + 6 + 10 + 2 + 3);
         let text = Text::new("keys", "[mesh]\nfile = \"a.glb\"\nunknown_key = 1".to_owned(), &[]).unwrap();
         let message = text.parse::<SceneFile>(("mesh", "generator")).unwrap_err().to_string();
         let (_, documented) = DOCUMENTATION.split_once("\n## `[mesh]`").unwrap();

@@ -80,9 +80,15 @@ pub struct Scene {
     pub march: March,
     /// How it goes from tetrahedron to tetrahedron.
     pub traversal: Traversal,
+    /// What part of the light, 0 to 0.1, a ray that walks must let through to go on: by so much a picture may be off, where nothing in it is
+    /// brighter than 1.
+    pub end_below: f64,
     /// What it may leave out.
     pub skips: Skips,
 }
+
+/// By default a ray ends where less is let through, which changes no picture by 1e-6.
+pub const END_BELOW: f64 = 1.0 / (1 << 20) as f64;
 
 /// What a scene asks of a device, known before its volume is computed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -197,7 +203,7 @@ impl Scene {
             && Arc::ptr_eq(&self.volume, &other.volume)
             && Arc::ptr_eq(&self.solids, &other.solids)
             && (self.medium, self.view, self.march) == (other.medium, other.view, other.march)
-            && (self.traversal, self.skips) == (other.traversal, other.skips)
+            && (self.traversal, self.end_below, self.skips) == (other.traversal, other.end_below, other.skips)
             && self.shading == other.shading
     }
 
@@ -221,6 +227,7 @@ impl Scene {
             view: View { camera, width: 512, height: 512, depth: false },
             march: March::default(),
             traversal: Traversal::default(),
+            end_below: END_BELOW,
             skips: Skips::default(),
         }
     }

@@ -366,6 +366,7 @@ impl Parts {
                 Plan::Exact => March::Exact,
             },
             traversal: file.march.traversal,
+            end_below: file.march.end_below.0,
             skips: Skips::without(&file.march.no_skip),
             shading: shading.transpose()?,
             solids,

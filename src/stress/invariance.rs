@@ -18,7 +18,7 @@ use crate::mesh::Mesh;
 use crate::mesh::generate::{Generator, Plane, Torus};
 use crate::metric;
 use crate::reference;
-use crate::scene::{March, Medium, Scene, Skips, Traversal, View};
+use crate::scene::{END_BELOW, March, Medium, Scene, Skips, Traversal, View};
 use crate::shell::{Shell, ShellOptions};
 use crate::volume::{Pyramid, Quantity, Volume};
 
@@ -97,6 +97,7 @@ fn in_waves(mesh: &Mesh, scale: f64, view: View) -> Result<Arc<Scene>> {
         view,
         march: March::default(),
         traversal: Traversal::default(),
+        end_below: END_BELOW,
         skips: Skips::default(),
     }))
 }

@@ -8,7 +8,7 @@ use glam::DVec3;
 
 use crate::Result;
 use crate::mesh::Mesh;
-use crate::scene::{Camera, March, Medium, Scene, Skips, Traversal, View};
+use crate::scene::{Camera, END_BELOW, March, Medium, Scene, Skips, Traversal, View};
 use crate::shell::{EXTERIOR, Shell, ShellOptions, Topology};
 use crate::volume::{Pyramid, Quantity, Volume};
 
@@ -39,6 +39,7 @@ pub fn painted(shell: Shell, paints: &[Paint], opacity_distance: f64, view: View
         view,
         march: March::default(),
         traversal: Traversal::default(),
+        end_below: END_BELOW,
         skips: Skips::default(),
     }
 }

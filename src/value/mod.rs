@@ -8,6 +8,6 @@ pub use colour::Colour;
 pub use list::Exactly;
 pub(crate) use list::exactly;
 pub use number::{
-    BelowOne, ErrorEvery, FieldOfView, Finite, Fraction, Frames, NotNegative, PictureSize, Pixels, Positive,
-    Rate, Rounds, Runs, Samples, ShadowSize, Shininess, Step, Stops,
+    BelowOne, EndBelow, ErrorEvery, FieldOfView, Finite, Fraction, Frames, NotNegative, PictureSize, Pixels,
+    Positive, Rate, Rounds, Runs, Samples, ShadowSize, Shininess, Step, Stops,
 };

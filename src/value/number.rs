@@ -98,6 +98,10 @@ number! {
     BelowOne = "a number from 0 to 1, excluding 1", |value| (0.0..1.0).contains(&value)
 }
 number! {
+    /// The part of light at which a ray ends.
+    EndBelow = "a number from 0 to 0.1", |value| (0.0..=0.1).contains(&value)
+}
+number! {
     /// An exposure: each stop is twice as bright.
     Stops = "a number of stops from -20 to 20", |value| (-20.0..=20.0).contains(&value)
 }

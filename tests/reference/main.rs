@@ -85,6 +85,7 @@ fn scene(shell: Shell, volume: Pyramid, view: View) -> Scene {
         view,
         march: March::Default { step: 1.0 },
         traversal: Traversal::default(),
+        end_below: mesoshell::scene::END_BELOW,
         skips: Skips::default(),
     }
 }

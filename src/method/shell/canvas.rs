@@ -5,7 +5,7 @@ use super::lit::{self, LitView, Sight as LitSight};
 use super::seen::{Run, Seen};
 use super::solids::SolidView;
 use super::squares;
-use super::walk::{self, RayBuffers, Ways};
+use super::walk::{RayBuffers, Ways};
 use super::{Shell, Sight};
 use crate::gpu::{Batch, Buffer, Keeps, Pipeline, PipelineInfo, Target, shaders};
 use crate::scene::{Model, Skip, View};
@@ -175,7 +175,7 @@ impl Shell {
         let glow = shading.is_some_and(|shading| shading.emission.glow > 0.0);
         let inside = matches!(sight, Sight::Walked(crossings) if crossings.begun_inside > 0);
         constants.extend([fibre, glow, inside].map(u32::from));
-        constants.push(if skips.allow(Skip::Saturation) { walk::SATURATED.to_bits() } else { 0 });
+        constants.push(if skips.allow(Skip::Saturation) { (self.scene.end_below as f32).to_bits() } else { 0 });
         let lights = self.scene.shading.iter().flat_map(|shading| &shading.lights);
         constants.extend(lit::constants(lights, self.shadows.as_ref()));
         CanvasKind {

@@ -70,11 +70,11 @@ impl Shell {
             format!("{:.0} % of the volume is one medium without directions", 100.0 * self.volume.evenness());
         let even = leap(Skip::EvenSpace, enough.even, is_even, even);
         let saturation = if !walks {
-            "all that is sorted is drawn"
+            "all that is sorted is drawn".to_owned()
         } else if allows(Skip::Saturation) {
-            "rays end where 2^-20 of the light is let through"
+            format!("rays end where {:.0e} of the light is let through", self.scene.end_below)
         } else {
-            "it is switched off"
+            switched_off()
         };
         let levels = if allows(Skip::Levels) { "asked of each view" } else { "it is switched off" };
         let kept = if allows(Skip::Kept) { "compared with the frame before" } else { "it is switched off" };
@@ -86,7 +86,7 @@ impl Shell {
             choice("traversal", walk.0, walk.1),
             choice(Skip::EmptySpace.name(), on(is_sparse), empty),
             choice(Skip::EvenSpace.name(), on(is_even), even),
-            choice(Skip::Saturation.name(), on(walks && allows(Skip::Saturation)), saturation.to_owned()),
+            choice(Skip::Saturation.name(), on(walks && allows(Skip::Saturation)), saturation),
             choice(Skip::Levels.name(), on(allows(Skip::Levels)), levels.to_owned()),
             choice(Skip::Kept.name(), on(allows(Skip::Kept)), kept.to_owned()),
             choice(

@@ -57,7 +57,8 @@ impl Shell {
                     .skipped
                     .push("each ray walks from tetrahedron to tetrahedron: nothing is sorted".into());
                 if self.scene.skips.allow(Skip::Saturation) {
-                    report.skipped.push("rays end where 2^-20 of the light is let through".into());
+                    let end = self.scene.end_below;
+                    report.skipped.push(format!("rays end where {end:.0e} of the light is let through"));
                 }
             }
         }

@@ -13,9 +13,6 @@ use crate::shell::{Shell, Topology};
 /// would be left to the host. Where there may be more, tetrahedra are sorted.
 pub const MOST_SAMPLES: f64 = 500.0;
 
-/// A ray ends where less is let through: that changes no picture by 1e-6.
-pub const SATURATED: f32 = 1.0 / (1 << 20) as f32;
-
 /// Whether buffers of so many texels hold a shell for the rays of so many pixels to walk through.
 pub fn holds(most_texels: usize, shell: &Shell, pixels: usize) -> bool {
     let cells = size_of::<Cell>() / size_of::<[f32; 4]>() * shell.topology.tetrahedra.len();
