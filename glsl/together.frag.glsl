@@ -99,7 +99,7 @@ void main() {
     uint walker = 0;
     Sum sum = nothing();
 #ifdef EVEN
-    float even_paths = 0.0; // those of all walkers, in the even stretch
+    uint even_walkers = 0; // in the even stretch
 #endif
     bool is_done = false;
     while (!is_left && passes < MOST_PASSES) {
@@ -171,8 +171,10 @@ void main() {
             }
             passes += walkers;
 #ifdef EVEN
+            // Of as many walkers all along: else its light would not come from where it is said to.
+            is_even = is_even && (!even_waits() || even_walkers == walkers);
             if (is_even && steps <= view.even_steps - even.steps) {
-                even_paths = (even_waits() ? even_paths : 0.0) + float(walkers) * (stop - begin);
+                even_walkers = walkers;
                 pass_evenly(begin, stop, steps);
                 steps = 0;
                 if (even_is_full()) break;
@@ -190,7 +192,7 @@ void main() {
             vec4 texel = fetch(path, z);
             bool is_even = even_waits();
 #ifdef EVEN
-            float optical = extinction(view.even) * max(even_paths * per_depth, LEAST);
+            float optical = extinction(view.even) * max(float(even_walkers) * (even.end - even.begin) * per_depth, LEAST);
             if (is_even) {
                 texel = view.even;
                 z = even.begin + (even.end - even.begin) * mean_depth(optical, opacity(optical));

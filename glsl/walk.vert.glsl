@@ -1,8 +1,8 @@
 #version 450
 #extension GL_ARB_shading_language_include : require
 // switches: TOGETHER
-// Squares of pixels that cover the picture, row by row, as two triangles each: parts in which it may be drawn. Their depth is the
-// mark of the pixels that are.
+// Squares of pixels that cover the picture, row by row, as two triangles each: parts in which it may be drawn. Their depth is between
+// the marks of the pixels that are and of the others.
 
 #include "shell.glsl"
 #include "marks.glsl"
@@ -17,9 +17,9 @@ void main() {
     uint corner = CORNERS[gl_VertexIndex % 6];
     uvec2 at = uvec2(square % columns, square / columns) + uvec2(corner == 1 || corner == 2, corner >= 2);
 #ifdef TOGETHER
-    const float mark = INTRICATE_MARK;
+    const float depth = mix(INTRICATE_MARK, NOTHING_MARK, 0.5);
 #else
-    const float mark = ALONE_MARK;
+    const float depth = mix(ALONE_MARK, NOTHING_MARK, 0.5);
 #endif
-    gl_Position = vec4(vec2(at * SIDE) / view.centre - 1.0, mark, 1.0);
+    gl_Position = vec4(vec2(at * SIDE) / view.centre - 1.0, depth, 1.0);
 }

@@ -169,7 +169,7 @@ fn a_draw_whose_parts_do_not_fit_reaches_no_device() {
         assert!(!draws(&target(gpu, 1), &[&own; 3], bytes - 4), "push constants are missing");
         assert!(!draws(&target(&other, 1), &[&own; 3], bytes), "another device's target");
         assert!(!draws(&target(gpu, 1), &[&own, &own, &foreign], bytes), "another device's buffer");
-        for keeps in [Keeps::Nearest, Keeps::Marks, Keeps::BlendMarked] {
+        for keeps in [Keeps::Nearest, Keeps::Marks, Keeps::BlendAbove, Keeps::BlendBelow] {
             let info = PipelineInfo { keeps, ..shell_pipeline(bytes as u32) };
             let wrong = || Pipeline::new(gpu, &target(gpu, 1), &info);
             assert!(catch_unwind(AssertUnwindSafe(wrong)).is_err(), "{keeps:?}: the target has no depths");

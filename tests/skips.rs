@@ -86,25 +86,34 @@ fn what_is_even_is_passed_in_long_steps() {
         lights: shading.lights.iter().map(|light| Light { shadow: false, ..*light }).collect(),
         ..shading.clone()
     };
-    let compare = |scene: &Scene| {
-        let [with, without] = with_and_without(Skip::EvenSpace, scene);
+    let both = |scene: &Scene| {
+        // Whether a ray ends is asked after every few samples, and of these there are fewer.
+        let [with, without] = with_and_without_of(Skip::EvenSpace, scene, &[Skip::Saturation]);
         assert_eq!((with.1.chosen, without.1.chosen), ("on", "off"), "{with:?}");
-        metric::compare(&with.0.image, &without.0.image).unwrap()
+        [with.0, without.0]
+    };
+    let images = |[a, b]: &[Frame; 2]| metric::compare(&a.image, &b.image).unwrap();
+    // An opacity is off by 2^-20 of itself, for the exponential, and opacities times what is let through add up to 1 at most, in either
+    // picture; texels of coarser levels are off by 9 * 2^-23; colours in this light are below 2. Depths of steps are those of their
+    // middles, from which the mean of what they send out is a twelfth of their optical depth, 0.12, times their length, 0.003.
+    let agree = |frames: &[Frame; 2], what: &str| {
+        let [a, b] = frames;
+        assert!(images(frames).max <= 1e-5, "{what}: {:?}", images(frames));
+        assert!(difference([a, b]) <= 1e-4, "{what}: {}", difference([a, b]));
     };
     for traversal in [Traversal::Walk, Traversal::Sort] {
-        // Sums of as many terms, each rounded to f32: a few hundred steps, of 2^-24 each.
         for shading in [None, Some(shadowless.clone())] {
-            let difference = compare(&Scene { shading, traversal, ..haze.clone() });
-            assert!(difference.max <= 2e-5, "{traversal:?}: {difference:?}");
+            let is_lit = shading.is_some();
+            let frames = both(&Scene { shading, traversal, ..haze.clone() });
+            agree(&frames, &format!("{traversal:?}, lit {is_lit}"));
         }
-        // What docs/speed.md says, and on a picture that small as much again.
-        let difference = compare(&Scene { traversal, ..haze.clone() });
-        assert!(difference.rmse > 0.0 && difference.rmse <= 2e-4, "{traversal:?}: {difference:?}");
+        // Not derived: twice what it was when it was measured, with more pixels.
+        let metrics = images(&both(&Scene { traversal, ..haze.clone() }));
+        assert!(metrics.rmse > 0.0 && metrics.rmse <= 2e-4, "{traversal:?}: {metrics:?}");
     }
     // Several parts of the shell at once.
     let together = load("table1/teapot-bust", &["shading.shadow_size=128"]);
-    let difference = compare(&Scene { shading: None, ..together });
-    assert!(difference.max <= 2e-5, "{difference:?}");
+    agree(&both(&Scene { shading: None, ..together }), "several parts");
 }
 
 #[test]

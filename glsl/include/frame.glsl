@@ -8,6 +8,7 @@ layout(set = 0, binding = 3) uniform samplerBuffer frames;
 // Of the tetrahedron that is being marched, affine in depth: `frame_at_eye + z frame_from_depth`.
 mat3 frame_at_eye;
 mat3 frame_from_depth;
+
 // Must be called before a point in a tetrahedron is lit.
 void enter(uint index, vec3 ray) {
     for (int column = 0; column < 3; column++) {

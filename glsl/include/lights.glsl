@@ -1,8 +1,8 @@
 // The lights of a scene, and what of them reaches a point. Points are in world space with the origin at the eye, in parts of
 // `Seen::unit`.
 
-// How many; which cast shadows, a bit each; how many pictures each of those has; and which shine from a point. Known to the compiler, so that where a loop over
-// lights is unrolled, what is read of them is at places that it knows: lavapipe reads that once for all pixels.
+// How many; which cast shadows, a bit each; how many pictures each of those has; and which shine from a point. Known to the compiler, so
+// that where a loop over lights is unrolled, what is read of them is at places that it knows: lavapipe reads that once for all pixels.
 layout(constant_id = 7) const uint LIGHTS = 0;
 layout(constant_id = 8) const uint CASTING_LOW = 0;
 layout(constant_id = 9) const uint CASTING_HIGH = 0; // from the 33rd light on

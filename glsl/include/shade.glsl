@@ -55,8 +55,8 @@ void look_along(vec3 ray) {
         half_ways[i] = half_way_to(to_light);
 #ifdef SHADOWS
         if (casts_shadows(i) && PICTURES == 1) {
-            at_eye[i] = in_picture(first_picture(i), vec3(0.0));
-            from_depth[i] = in_picture(first_picture(i), world_ray) - at_eye[i];
+            at_eye[i] = in_picture(first_picture(i), vec4(vec3(0.0), 1.0));
+            from_depth[i] = in_picture(first_picture(i), vec4(world_ray, 0.0));
         }
 #endif
     }

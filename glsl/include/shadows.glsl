@@ -30,11 +30,10 @@ float transmittance_until(vec2 at, float depth) {
     return opacity_of_all == 0.0 ? 1.0 : 1.0 - min(done * growth, opacity_of_all);
 }
 
-// The pixel beside its middle, to the right and upwards, and depth of a point, in a light's picture; of one that shows no parallel rays
-// the pixel times the depth.
-vec3 in_picture(uint index, vec3 point) {
+// The pixel beside its middle, to the right and upwards, and depth of a point, `vec4(point, 1)`, or of a way, `vec4(way, 0)`, in a light's
+// picture; of one that shows no parallel rays the pixel times the depth.
+vec3 in_picture(uint index, vec4 at) {
     LightPicture light = light_pictures[index];
-    vec4 at = vec4(point, 1.0);
     return vec3(dot(light.from_world[0], at), dot(light.from_world[1], at), dot(light.from_world[2], at));
 }
 
@@ -63,7 +62,7 @@ void look_in(uint index, vec3 there, bool is_parallel, inout Shown shown) {
 // Of a light whose pictures begin at `first`, and show parallel rays or not.
 Shown look_for(uint first, vec3 point, bool is_parallel) {
     Shown shown = nowhere();
-    for (uint i = 0; i < PICTURES; i++) look_in(first + i, in_picture(first + i, point), is_parallel, shown);
+    for (uint i = 0; i < PICTURES; i++) look_in(first + i, in_picture(first + i, vec4(point, 1.0)), is_parallel, shown);
     return shown;
 }
 

@@ -11,6 +11,7 @@ layout(set = 0, binding = 21) uniform usamplerBuffer crossings; // places where 
 const uint NOWHERE = 0xffffffffu;
 // In `crossings`: here the ray leaves the shell; else it enters it.
 const uint LEAVES = 0x80000000u;
+
 layout(constant_id = 6) const float SATURATED = 0.0; // where no more is let through the rest is not looked at
 
 // Passes through loops after which a pixel is left: an eye's to the host. lavapipe runs eight pixels at once, all of them as often as the
@@ -190,8 +191,8 @@ Walker walker_at(int next, int last, bool is_begun, vec3 ray, inout uint passes)
     return walker;
 }
 
-// On to the next tetrahedron in which something may be seen, before `farthest`, or to the end of what is even. Where several pixels run at once, all of them wait here
-// for one another, and march together then.
+// On to the next tetrahedron in which something may be seen, before `farthest`, or to the end of what is even. Where several pixels run
+// at once, all of them wait here for one another, and march together then.
 Stretch go_on(inout Walker walker, vec3 ray, float farthest, inout uint passes) {
     Stretch stretch = nothing_passed();
     while (passes < MOST_PASSES) {

@@ -26,8 +26,10 @@ pub enum Keeps {
     Nearest,
     /// None: each marks its pixel by its depth value, for targets that have marks.
     Marks,
-    /// As `Blend`, and only of pixels that are marked by its depth value. Shaders should test that before they run.
-    BlendMarked,
+    /// As `Blend`, and only of pixels whose mark is less than its depth value. Shaders should test that before they run.
+    BlendAbove,
+    /// As `Blend`, and only of pixels whose mark is greater than its depth value.
+    BlendBelow,
 }
 
 /// What a [`Pipeline`] is made of: bindings and bytes are those that its shaders use.
@@ -91,11 +93,12 @@ impl Pipeline {
     pub fn new(gpu: &Arc<Gpu>, target: &Target, info: &PipelineInfo<'_>) -> Result<Self> {
         assert!(Arc::ptr_eq(gpu, &target.gpu), "the target is another device's");
         let nearest = info.keeps == Keeps::Nearest;
-        let blends = matches!(info.keeps, Keeps::Blend | Keeps::BlendMarked);
+        let blends = matches!(info.keeps, Keeps::Blend | Keeps::BlendAbove | Keeps::BlendBelow);
         let depths = match info.keeps {
             Keeps::Nearest => Some((vk::CompareOp::GREATER, true)),
             Keeps::Marks => Some((vk::CompareOp::ALWAYS, true)),
-            Keeps::BlendMarked => Some((vk::CompareOp::EQUAL, false)),
+            Keeps::BlendAbove => Some((vk::CompareOp::GREATER, false)),
+            Keeps::BlendBelow => Some((vk::CompareOp::LESS, false)),
             Keeps::Blend | Keeps::Last => None,
         };
         let has_depths = target.depth.is_some();

@@ -19,8 +19,8 @@ pub struct Target {
     pub(super) height: u32,
     /// For the host one for each attachment; for shaders a single one, with a layer for each.
     pub(super) images: Vec<DeviceImage>,
-    /// That the nearest of several surfaces is kept by, or by which pixels are marked.
-    pub(super) depth: Option<DeviceImage>,
+    /// That the nearest of several surfaces is kept by, or by which pixels are marked; and its format.
+    pub(super) depth: Option<(DeviceImage, vk::Format)>,
     /// What the host reads; none for shaders.
     pub(super) readbacks: Vec<Buffer>,
     /// What shaders read through; null for the host.
@@ -53,15 +53,17 @@ pub(super) enum ReadBy {
     },
 }
 
-/// Of surfaces, and marks.
+/// Of surfaces.
 const DEPTH_FORMAT: vk::Format = vk::Format::D32_SFLOAT;
+/// Of marks: Vulkan has every device draw into it.
+const MARK_FORMAT: vk::Format = vk::Format::D16_UNORM;
 
 impl Target {
     /// `attachments` images of `width x height` pixels that the host reads, in the most accurate format that the device blends; pixels
     /// can be `marked`.
     ///
     /// # Errors
-    /// [`Error::Usage`] where a side is 0; [`Error::Device`] where one is longer than the device allows, or pixels cannot be marked;
+    /// [`Error::Usage`] where a side is 0; [`Error::Device`] where one is longer than the device allows;
     /// [`Error::OutOfMemory`].
     ///
     /// # Panics
@@ -71,7 +73,7 @@ impl Target {
         let (format, bytes) = Self::check(gpu, name, [width, height], attachments, ReadBy::Host { marked })?;
         let mut target = Self::empty(gpu, name, format, [width, height], [attachments, 1])?;
         if marked {
-            target.keep_depths(name)?;
+            target.keep_depths(name, MARK_FORMAT)?;
         }
         target.readbacks =
             (0..attachments).map(|_| Buffer::readback(gpu, "the picture", bytes)).collect::<Result<_>>()?;
@@ -96,7 +98,11 @@ impl Target {
         let (format, _) = Self::check(gpu, name, [width, height], attachments, ReadBy::Shaders { nearest })?;
         let mut target = Self::empty(gpu, name, format, [width, height], [1, attachments])?;
         if nearest {
-            target.keep_depths(name)?;
+            if !gpu.supports(DEPTH_FORMAT, vk::FormatFeatureFlags::DEPTH_STENCIL_ATTACHMENT) {
+                let message = format!("{} has no depth buffer of 32 bits", gpu.info().name);
+                return Err(Error::Device { message, help: None });
+            }
+            target.keep_depths(name, DEPTH_FORMAT)?;
         }
         let clamp = vk::SamplerAddressMode::CLAMP_TO_EDGE;
         // With a bound of 0 lavapipe 22.3 would look up the level of each pixel by itself, as if there were several.
@@ -115,16 +121,12 @@ impl Target {
         self.pace.set(None);
     }
 
-    fn keep_depths(&mut self, name: &'static str) -> Result<()> {
-        let gpu = &self.gpu;
-        if !gpu.supports(DEPTH_FORMAT, vk::FormatFeatureFlags::DEPTH_STENCIL_ATTACHMENT) {
-            let message = format!("{} has no depth buffer of 32 bits", gpu.info().name);
-            return Err(Error::Device { message, help: None });
-        }
+    fn keep_depths(&mut self, name: &'static str, format: vk::Format) -> Result<()> {
         let usage = vk::ImageUsageFlags::DEPTH_STENCIL_ATTACHMENT;
-        let info = image_info(DEPTH_FORMAT, [self.width, self.height], 1, usage);
+        let info = image_info(format, [self.width, self.height], 1, usage);
         let aspect = vk::ImageAspectFlags::DEPTH;
-        self.depth = Some(DeviceImage::new(gpu, name, &info, vk::ImageViewType::TYPE_2D, aspect)?);
+        let image = DeviceImage::new(&self.gpu, name, &info, vk::ImageViewType::TYPE_2D, aspect)?;
+        self.depth = Some((image, format));
         Ok(())
     }
 
@@ -167,8 +169,13 @@ impl Target {
     fn finish(mut self) -> Result<Self> {
         self.clearing = render_pass(&self, true)?;
         self.continuing = render_pass(&self, false)?;
-        let views: Vec<vk::ImageView> =
-            self.images.iter().chain(&self.depth).flat_map(DeviceImage::layers).copied().collect();
+        let views: Vec<vk::ImageView> = self
+            .images
+            .iter()
+            .chain(self.depth.iter().map(|(image, _)| image))
+            .flat_map(DeviceImage::layers)
+            .copied()
+            .collect();
         let framebuffer_info = vk::FramebufferCreateInfo::default()
             .render_pass(self.clearing)
             .attachments(&views)
@@ -314,8 +321,8 @@ fn render_pass(target: &Target, clears: bool) -> Result<vk::RenderPass> {
     };
     let mut descriptions = vec![description(target.format.raw(), read_layout); target.attachments()];
     let depth_layout = vk::ImageLayout::DEPTH_STENCIL_ATTACHMENT_OPTIMAL;
-    if target.depth.is_some() {
-        descriptions.push(description(DEPTH_FORMAT, depth_layout));
+    if let Some((_, format)) = target.depth {
+        descriptions.push(description(format, depth_layout));
     }
     let count = u32::try_from(target.attachments()).expect("few attachments");
     let references: Vec<vk::AttachmentReference> = (0..count)

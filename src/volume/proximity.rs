@@ -71,7 +71,7 @@ impl Proximity {
 }
 
 /// Whether two texels are the same but for the rounding of means: levels of detail are those of the ones before, by f64, each rounded
-/// to f32, and there are at most nine.
+/// to f32. Beyond nine of them less may be found to be like the rest than is.
 fn is_like(texel: &[f32; 4], rest: &[f32; 4]) -> bool {
     texel.iter().zip(rest).all(|(a, b)| (a - b).abs() <= 9.0 * f32::EPSILON * b)
 }

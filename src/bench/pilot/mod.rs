@@ -25,11 +25,15 @@ use crate::scene::{March, Scene};
 use crate::{Error, Result};
 
 /// What feeds the shaders.
-const METHOD_CODE: [&str; 4] = [
+const METHOD_CODE: [&str; 8] = [
+    include_str!("../../method/shell/constants.rs"),
     include_str!("../../method/shell/lit.rs"),
     include_str!("../../method/shell/mod.rs"),
     include_str!("../../method/shell/outline.rs"),
+    include_str!("../../method/shell/plan.rs"),
     include_str!("../../method/shell/seen.rs"),
+    include_str!("../../method/shell/volume.rs"),
+    include_str!("../../volume/proximity.rs"),
 ];
 
 /// A march, and how far from the reference it was found to be.
@@ -111,7 +115,8 @@ fn fingerprint(scene: &Scene, method: &Entry, setup: &Setup<'_>) -> Result<Finge
     let device = Gpu::open(setup.device, setup.validation)?.info().clone();
     let of_reference = Fingerprint::of_reference(scene, &scene.view, 1).to_string();
     let mut builder = Fingerprint::builder("pilot");
-    for text in [&of_reference, method.name, &device.name, &device.driver] {
+    let ways = format!("{:?} {} {:?}", scene.traversal, scene.end_below, scene.skips);
+    for text in [&of_reference, method.name, &device.name, &device.driver, &ways] {
         builder = builder.bytes(text.as_bytes());
     }
     for shader in shaders::ALL.iter().flat_map(|family| family.all()) {

@@ -95,7 +95,7 @@ impl Canvas {
                 };
                 // Squares do not overlap: those of one pipeline are drawn together.
                 batches.sort_by_key(|batch| std::ptr::eq(batch.pipeline, pipeline));
-                batches.insert(0, Batch { pipeline: mark, vertices: 0..end });
+                batches.insert(0, Batch { pipeline: mark, vertices: 0..3 });
                 batches.extend(together.iter().map(|pipeline| Batch { pipeline, vertices: 0..end }));
                 batches
             }
@@ -175,7 +175,11 @@ impl Shell {
         let glow = shading.is_some_and(|shading| shading.emission.glow > 0.0);
         let inside = matches!(sight, Sight::Walked(crossings) if crossings.begun_inside > 0);
         constants.extend([fibre, glow, inside].map(u32::from));
-        constants.push(if skips.allow(Skip::Saturation) { (self.scene.end_below as f32).to_bits() } else { 0 });
+        constants.push(if skips.allow(Skip::Saturation) {
+            (self.scene.end_below as f32).to_bits()
+        } else {
+            0
+        });
         let lights = self.scene.shading.iter().flat_map(|shading| &shading.lights);
         constants.extend(lit::constants(lights, self.shadows.as_ref()));
         CanvasKind {
@@ -256,7 +260,7 @@ impl Shell {
             }
             Sight::Walked(crossings) => {
                 let mark = PipelineInfo {
-                    vertex: shaders::WALK_VERT.with(&[]),
+                    vertex: shaders::LAYER_VERT.with(&[]),
                     fragment: shaders::MARK_FRAG.with(&[]),
                     uniform_buffers: &[],
                     texel_buffers: &[20],
@@ -268,7 +272,7 @@ impl Shell {
                 let walked = PipelineInfo {
                     vertex: shaders::WALK_VERT.with(&[]),
                     fragment: shaders::WALK_FRAG.with(on),
-                    keeps: Keeps::BlendMarked,
+                    keeps: Keeps::BlendAbove,
                     ..info
                 };
                 let pipeline = Pipeline::new(&self.gpu, &target, &walked)?;
@@ -286,6 +290,7 @@ impl Shell {
                 let of_several = PipelineInfo {
                     vertex: shaders::WALK_VERT.with(&["TOGETHER"]),
                     fragment: shaders::TOGETHER_FRAG.with(on),
+                    keeps: Keeps::BlendBelow,
                     ..walked
                 };
                 let together = kind.cycles.then(|| Pipeline::new(&self.gpu, &target, &of_several));

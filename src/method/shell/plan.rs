@@ -23,6 +23,14 @@ pub(super) fn enough_to_leap(scene: &Scene) -> Enough {
     Enough { empty: may(Skip::EmptySpace).then_some(sparse), even: may(Skip::EvenSpace).then_some(EVEN) }
 }
 
+/// Where rays that walk end, for people.
+pub(super) fn where_rays_end(scene: &Scene) -> String {
+    match scene.end_below {
+        0.0 => "rays end where nothing is let through".to_owned(),
+        part => format!("rays end where {part:.0e} of the light is let through"),
+    }
+}
+
 impl Shell {
     /// Whether the device has room for rays of this view to walk.
     fn has_room(&self, view: &View) -> bool {
@@ -56,23 +64,24 @@ impl Shell {
         };
         let on = |is_on: bool| if is_on { "on" } else { "off" };
         let enough = enough_to_leap(&self.scene);
+        let (is_sparse, is_even) = (self.volume.is_sparse(), self.volume.even().is_some());
+        let leaps = is_sparse || is_even;
         let leap = |skip, enough: Option<f64>, is_on, found: String| match enough {
             _ if !allows(skip) => switched_off(),
             None => format!("the {} takes all its samples", self.scene.march),
             Some(_) if is_on => found,
+            Some(_) if leaps => format!("{found}: rays leap over the other"),
             Some(enough) => format!("{found}: looking would pay from {:.0} % on", 100.0 * enough),
         };
-        let is_sparse = self.volume.is_sparse();
         let empty = format!("{:.0} % of the volume is empty", 100.0 * self.volume.emptiness());
         let empty = leap(Skip::EmptySpace, enough.empty, is_sparse, empty);
-        let is_even = self.volume.even().is_some();
         let even =
             format!("{:.0} % of the volume is one medium without directions", 100.0 * self.volume.evenness());
         let even = leap(Skip::EvenSpace, enough.even, is_even, even);
         let saturation = if !walks {
             "all that is sorted is drawn".to_owned()
         } else if allows(Skip::Saturation) {
-            format!("rays end where {:.0e} of the light is let through", self.scene.end_below)
+            where_rays_end(&self.scene)
         } else {
             switched_off()
         };

@@ -2,6 +2,7 @@
 
 use super::canvas::Canvas;
 use super::constants::{MOST_SAMPLES, wanted_samples};
+use super::plan::where_rays_end;
 use super::seen::Seen;
 use super::{Shell, Sight};
 use crate::frame::Report;
@@ -57,8 +58,7 @@ impl Shell {
                     .skipped
                     .push("each ray walks from tetrahedron to tetrahedron: nothing is sorted".into());
                 if self.scene.skips.allow(Skip::Saturation) {
-                    let end = self.scene.end_below;
-                    report.skipped.push(format!("rays end where {end:.0e} of the light is let through"));
+                    report.skipped.push(where_rays_end(&self.scene));
                 }
             }
         }

@@ -79,7 +79,7 @@ struct CurvePipelines {
 
 impl Shadows {
     /// Draws the pictures of all lights that cast shadows, of which there is at least one. `ways` are of the scene's shell, and placed
-    /// where the device holds its tetrahedra; where `leaps`, rays do, over what is empty.
+    /// where the device holds its tetrahedra.
     ///
     /// # Errors
     /// [`Error::Device`] where the pictures are too large for the device,

@@ -32,7 +32,9 @@ impl Shell {
             (None, None) => true,
             _ => false,
         };
-        let volume = if same_volume && same_directions && enough_to_leap(before) == enough_to_leap(&scene) {
+        let enough = enough_to_leap(&scene);
+        let same_leaps = enough == enough_to_leap(before) && (same_directions || enough.even.is_none());
+        let volume = if same_volume && same_leaps {
             kept.push("the volume is kept on the device: it is the same".to_owned());
             None
         } else {

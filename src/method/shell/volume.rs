@@ -51,18 +51,23 @@ impl DeviceVolume {
         let nothing = [0.0; 4];
         let mut device = Self { texture, alpha: OnceCell::new(), leap: None, emptiness: 0.0, evenness: 0.0 };
         device.emptiness = part_like(full, nothing);
-        let medium = enough.even.and_then(|_| commonest(full));
-        device.evenness = medium.map_or(0.0, |medium| part_like(full, medium));
-        let (over, part, enough) = match medium {
-            Some(medium) if device.evenness > device.emptiness => (medium, &mut device.evenness, enough.even),
-            _ => (nothing, &mut device.emptiness, enough.empty),
-        };
+        let medium = enough.even.and_then(|_| commonest(full)).unwrap_or(nothing);
+        device.evenness = if medium == nothing { 0.0 } else { part_like(full, medium) };
         // Around what is unlike it less is so: where these texels are too few, distances need not be known.
-        if enough.is_some_and(|enough| *part >= enough) {
-            let directions = scene.shading.as_ref().map(|shading| &*shading.directions);
+        let directions = scene.shading.as_ref().map(|shading| &*shading.directions);
+        let is_enough = |part: f64, enough: Option<f64>| enough.is_some_and(|enough| part >= enough);
+        let mut longest = 0.0;
+        for (over, directions, part, enough) in [
+            (nothing, None, &mut device.emptiness, enough.empty),
+            (medium, directions, &mut device.evenness, enough.even),
+        ] {
+            if !is_enough(*part, enough) || *part <= longest {
+                continue;
+            }
             let proximity = Proximity::new(volume, directions, over);
             *part = proximity.part();
-            if enough.is_some_and(|enough| *part >= enough) {
+            if is_enough(*part, enough) && *part > longest {
+                longest = *part;
                 let proximity = Texture3d::upload_proximity(gpu, "the volume's distances", &proximity)?;
                 device.leap = Some(Leap { over, proximity });
             }
