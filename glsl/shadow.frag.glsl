@@ -49,7 +49,7 @@ void main() {
             dim(part.begin, part.size, extinction(texel) * max(part.size * per_depth, LEAST));
             passes += PASSES_A_SAMPLE;
             stretch.first = seek(stretch.path, steps, stretch.first, passes);
-            if (stretch.first >= steps.count || ++taken == AT_A_TIME) break;
+            if (stretch.first >= steps.count || ++taken == AT_A_TIME || is_dark()) break;
         }
         if ((walker.is_done && stretch.first >= steps.count && !even_waits()) || is_dark()) break;
     }

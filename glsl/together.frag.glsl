@@ -223,7 +223,7 @@ void main() {
             light.depth += transmittance(light.gathered) * mixed.a * z;
             lay_behind(light.gathered, mixed);
             passes += PASSES_A_SAMPLE;
-            if (++taken == AT_A_TIME || (step_index == steps && !even_waits())) break;
+            if (++taken == AT_A_TIME || (step_index == steps && !even_waits()) || transmittance(light.gathered) <= SATURATED) break;
         }
         if ((is_done && !even_waits()) || transmittance(light.gathered) <= SATURATED) break;
     }

@@ -47,8 +47,7 @@ fn difference([a, b]: [&Frame; 2]) -> f64 {
 
 #[test]
 fn leaps_change_nothing() {
-    // Whether a ray ends is asked after every few samples, and leaps leave some out.
-    let leap = |scene: &Scene| with_and_without_of(Skip::EmptySpace, scene, &[Skip::Saturation]);
+    let leap = |scene: &Scene| with_and_without(Skip::EmptySpace, scene);
     let plans =
         [(March::Default { step: 0.5 }, Traversal::Walk), (March::Default { step: 0.3 }, Traversal::Sort)];
     // From ever farther away: coarser levels are read, and several in one tetrahedron.
@@ -87,7 +86,7 @@ fn what_is_even_is_passed_in_long_steps() {
         ..shading.clone()
     };
     let both = |scene: &Scene| {
-        // Whether a ray ends is asked after every few samples, and of these there are fewer.
+        // Whether a ray ends is asked after every sample, and of these there are fewer.
         let [with, without] = with_and_without_of(Skip::EvenSpace, scene, &[Skip::Saturation]);
         assert_eq!((with.1.chosen, without.1.chosen), ("on", "off"), "{with:?}");
         [with.0, without.0]

@@ -34,6 +34,8 @@ float mean_depth(float optical, float alpha) {
     return optical < 0.5 ? series : 1.0 / optical - (1.0 - alpha) / alpha;
 }
 
+layout(constant_id = 6) const float SATURATED = 0.0; // where no more is let through the rest is not looked at
+
 #ifdef WALKS
 // Samples that are taken in a tetrahedron before the rays of other pixels, which run at once and wait, go on to their next one. Unlit
 // samples cost less than a step from one tetrahedron to the next, lit ones more.
@@ -73,7 +75,7 @@ void march_midpoints(Path path, Steps steps, inout uint i, float per_depth, inou
         passes += PASSES_A_SAMPLE;
         i = seek(path, steps, i, passes);
 #ifdef WALKS
-        if (i >= steps.count || ++taken == AT_A_TIME) break;
+        if (i >= steps.count || ++taken == AT_A_TIME || transmittance(light.gathered) <= SATURATED) break;
 #else
         if (i >= steps.count && !even_waits()) break;
 #endif

@@ -12,8 +12,6 @@ const uint NOWHERE = 0xffffffffu;
 // In `crossings`: here the ray leaves the shell; else it enters it.
 const uint LEAVES = 0x80000000u;
 
-layout(constant_id = 6) const float SATURATED = 0.0; // where no more is let through the rest is not looked at
-
 // Passes through loops after which a pixel is left: an eye's to the host. lavapipe runs eight pixels at once, all of them as often as the
 // one that needs it most, and ends all loops after 65,535 passes.
 const uint MOST_PASSES = 8000;

@@ -8,8 +8,7 @@ use crate::method::Choice;
 use crate::scene::{March, Scene, Skip, Traversal, View};
 
 /// The part of the volume that must be empty for rays to look how far they may leap: to look costs a fetch for every sample that is
-/// taken. 18 % (lit-fur) and 41 % (fur-sphere, unlit) are too little, 41 % (vase-trees) are as good as none, 42 % (tube-rocks) save two
-/// fifths.
+/// taken. 18 % (lit-fur) are too little, 41 % (vase-trees) are as good as none, 42 % (tube-rocks) save two fifths.
 const SPARSE: f64 = 0.5;
 const SPARSE_LIT: f64 = 0.3;
 
