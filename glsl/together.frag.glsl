@@ -53,7 +53,7 @@ bool leaves_by(uint exit, float depth, int first, int last, vec3 ray) {
     return false;
 }
 
-const uint AT_A_TIME = 3; // of what walkers add, before other pixels' rays go on: see march.glsl
+const uint SHARES_AT_A_TIME = 3; // of what walkers add, before the rays of other pixels go on: see march.glsl
 
 void main() {
     int first;
@@ -223,7 +223,7 @@ void main() {
             light.depth += transmittance(light.gathered) * mixed.a * z;
             lay_behind(light.gathered, mixed);
             passes += PASSES_A_SAMPLE;
-            if (++taken == AT_A_TIME || (step_index == steps && !even_waits()) || transmittance(light.gathered) <= SATURATED) break;
+            if (++taken == SHARES_AT_A_TIME || (step_index == steps && !even_waits()) || transmittance(light.gathered) <= SATURATED) break;
         }
         if ((is_done && !even_waits()) || transmittance(light.gathered) <= SATURATED) break;
     }

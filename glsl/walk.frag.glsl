@@ -40,16 +40,28 @@ void main() {
     Light light = Light(Gathered(vec4(0.0), vec4(0.0)), 0.0);
     uint passes = 0;
     Walker walker = walker_at(next, last, is_begun, ray, passes);
+#ifdef FEW_AT_A_TIME
     Stretch stretch = nothing_passed();
+#endif
     while (!walker.strays && passes < MOST_PASSES) {
+#ifdef FEW_AT_A_TIME
         if (stretch.first >= stretch.steps.count) stretch = go_on(walker, ray, farthest, passes);
+#else
+        Stretch stretch = go_on(walker, ray, farthest, passes);
+#endif
+        bool is_passed = true;
         if (stretch.first < stretch.steps.count || even_waits()) {
 #ifdef LIT
             enter(stretch.cell, ray);
 #endif
-            march_midpoints(stretch.path, stretch.steps, stretch.first, per_depth, light, passes);
+            uint i = stretch.first;
+            march_midpoints(stretch.path, stretch.steps, i, per_depth, light, passes);
+#ifdef FEW_AT_A_TIME
+            stretch.first = i;
+            is_passed = i >= stretch.steps.count;
+#endif
         }
-        if ((walker.is_done && stretch.first >= stretch.steps.count && !even_waits()) || transmittance(light.gathered) <= SATURATED) break;
+        if ((walker.is_done && is_passed && !even_waits()) || transmittance(light.gathered) <= SATURATED) break;
     }
     bool is_left = walker.strays || passes >= MOST_PASSES;
     out_rgba = is_left ? vec4(uintBitsToFloat(0x7f800000u)) : light.gathered.rgba;

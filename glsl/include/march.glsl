@@ -36,21 +36,18 @@ float mean_depth(float optical, float alpha) {
 
 layout(constant_id = 6) const float SATURATED = 0.0; // where no more is let through the rest is not looked at
 
-#ifdef WALKS
+#if defined(WALKS) && defined(LIT)
 // Samples that are taken in a tetrahedron before the rays of other pixels, which run at once and wait, go on to their next one. Unlit
-// samples cost less than a step from one tetrahedron to the next, lit ones more.
-#ifdef LIT
+// ones, which cost less than to ask whose turn it is, are all taken.
+#define FEW_AT_A_TIME
 const uint AT_A_TIME = 2;
-#else
-const uint AT_A_TIME = 3;
-#endif
 #endif
 
 // Midpoint rule over the steps from number `i` on, which becomes that of the next: the texture is constant over a step, and the
-// exponential is exact. What is even is one step, however long. Where `WALKS`, a few steps are taken, and what is even at the end is
-// left to wait. Counts passes through loops.
+// exponential is exact. What is even is one step, however long. Where `FEW_AT_A_TIME`, no more are taken; where `WALKS`, what is even at the
+// end is left to wait. Counts passes through loops.
 void march_midpoints(Path path, Steps steps, inout uint i, float per_depth, inout Light light, inout uint passes) {
-#ifdef WALKS
+#ifdef FEW_AT_A_TIME
     uint taken = 0;
 #endif
     // Where several pixels run at once, a test at the end costs no pass that nobody needs; but a loop whose only end that is lavapipe
@@ -74,8 +71,11 @@ void march_midpoints(Path path, Steps steps, inout uint i, float per_depth, inou
         lay_behind(light.gathered, vec4(emitted(texel, alpha), alpha));
         passes += PASSES_A_SAMPLE;
         i = seek(path, steps, i, passes);
-#ifdef WALKS
-        if (i >= steps.count || ++taken == AT_A_TIME || transmittance(light.gathered) <= SATURATED) break;
+#if defined(FEW_AT_A_TIME)
+        taken++;
+        if (i >= steps.count || taken == AT_A_TIME || transmittance(light.gathered) <= SATURATED) break;
+#elif defined(WALKS)
+        if (i >= steps.count) break;
 #else
         if (i >= steps.count && !even_waits()) break;
 #endif
