@@ -44,8 +44,8 @@ const uint AT_A_TIME = 2;
 #endif
 
 // Midpoint rule over the steps from number `i` on, which becomes that of the next: the texture is constant over a step, and the
-// exponential is exact. What is even is one step, however long. Where `FEW_AT_A_TIME`, no more are taken; where `WALKS`, what is even at the
-// end is left to wait. Counts passes through loops.
+// exponential is exact. What is even is one step, however long. Where `FEW_AT_A_TIME`, it stops after so many, or where nothing more is
+// seen; where `WALKS`, what is even at the end is left to wait. Counts passes through loops.
 void march_midpoints(Path path, Steps steps, inout uint i, float per_depth, inout Light light, inout uint passes) {
 #ifdef FEW_AT_A_TIME
     uint taken = 0;

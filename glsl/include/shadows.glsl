@@ -66,6 +66,7 @@ Shown look_for(uint first, vec3 point, bool is_parallel) {
     return shown;
 }
 
+// The part of the light that reaches a point which is shown there.
 float let_through(Shown shown, bool is_parallel) {
     vec3 place = shown.place;
     vec2 low = floor(shown.corner);
