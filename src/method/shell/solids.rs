@@ -25,11 +25,20 @@ use crate::volume::{Pyramid, Quantity, Volume};
 pub struct Triangle {
     pub corners: [[f32; 4]; 3],
     pub plane: [f32; 4],
-    pub texture: [[f32; 4]; 2],
-    pub normal: [[f32; 4]; 3],
-    pub facing: [f32; 4],
-    pub colour: [f32; 4],
 }
+
+/// `Face` of `glsl/surface.frag.glsl`: see there for each member.
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+#[repr(C)]
+struct Face {
+    texture: [[f32; 4]; 2],
+    normal: [[f32; 4]; 3],
+    facing: [f32; 4],
+    colour: [f32; 4],
+}
+
+/// The side, in pixels, of the tiles in which solids are lit: small enough that few pixels beside them are.
+const TILE: u32 = 16;
 
 /// What does not depend on the view: a texture for each solid.
 pub struct Solids {
@@ -103,7 +112,8 @@ impl SolidView {
             vertex: shaders::TILE_VERT.with(&[]),
             fragment: shaders::SURFACE_FRAG.with(on),
             constants,
-            storage_buffers: &[1, 7],
+            storage_buffers: &[1],
+            texel_buffers: &[23],
             uniform_buffers: match (on.contains(&"LIT"), on.contains(&"SHADOWS")) {
                 (false, _) => &[],
                 (true, false) => &[5],
@@ -139,14 +149,14 @@ impl SolidView {
         interrupt: &Interrupt,
     ) -> Result<()> {
         let eye = Eye::new(view, unit, bias);
-        let triangles: Vec<Triangle> = scene
+        let (triangles, faces): (Vec<Triangle>, Vec<Face>) = scene
             .solids
             .iter()
             .flat_map(|solid| (0..solid.mesh.triangles.len()).map(move |triangle| (solid, triangle)))
             .collect::<Vec<_>>()
             .into_par_iter()
             .map(|(solid, triangle)| eye.triangle(solid, triangle))
-            .collect();
+            .unzip();
         let mut tiles = Vec::new();
         // Of each solid.
         let mut vertices = Vec::new();
@@ -161,9 +171,10 @@ impl SolidView {
             vertices.push(first..6 * tiles.len() as u32);
         }
         let triangles = Buffer::storage(gpu, "the solids", &triangles)?;
+        let faces = Buffer::floats(gpu, "the solids' faces", &faces)?;
         let tiles = Buffer::storage(gpu, "where solids are", &tiles)?;
         let buffers: Vec<(u32, &Buffer)> =
-            lights.iter().copied().chain([(1, &tiles), (7, &triangles)]).collect();
+            lights.iter().copied().chain([(1, &tiles), (7, &triangles), (23, &faces)]).collect();
         let find = Draw {
             target: &self.nearest,
             clears: true,
@@ -197,7 +208,7 @@ impl SolidView {
 /// The bounds of the [`Squares`] in which any of these triangles may be seen. lavapipe lights also what it discards, so the fewer the
 /// better.
 fn where_seen(triangles: &[Triangle], view: &View) -> impl Iterator<Item = [f32; 4]> {
-    let squares = Squares::of(view);
+    let squares = Squares::of_side(view, TILE);
     let projection = Projection::new(view, 0.0);
     let mut is_seen = vec![false; squares.count()];
     for triangle in triangles {
@@ -226,7 +237,7 @@ impl Eye {
         Self { position: view.camera.eye, view_from_world, unit, bias }
     }
 
-    fn triangle(&self, solid: &Solid, triangle: usize) -> Triangle {
+    fn triangle(&self, solid: &Solid, triangle: usize) -> (Triangle, Face) {
         let corners = solid.corners(triangle).map(|corner| corner - self.position);
         let [a, b, c] = corners;
         let normal = (b - a).cross(c - a).normalize_or_zero();
@@ -244,13 +255,15 @@ impl Eye {
         let uvs = solid.mesh.uvs[triangle];
         let whole = uvs[0].min(uvs[1]).min(uvs[2]).floor();
         let uvs = uvs.map(|uv| uv - whole);
-        Triangle {
+        let seen = Triangle {
             corners: corners
                 .map(|corner| (self.view_from_world * corner / self.unit).as_vec3().extend(0.0).to_array()),
             plane: (self.view_from_world * normal)
                 .as_vec3()
                 .extend((normal.dot(a) / self.unit) as f32)
                 .to_array(),
+        };
+        let face = Face {
             texture: [row(uvs.map(|uv| uv.x)), row(uvs.map(|uv| uv.y))],
             normal: [0, 1, 2].map(|axis| row(normals.map(|normal| normal[axis]))),
             facing: (side * normal).as_vec3().extend((self.bias / self.unit) as f32).to_array(),
@@ -259,6 +272,7 @@ impl Eye {
                 .as_vec3()
                 .extend((solid.texels_per_unit(triangle) * self.unit) as f32)
                 .to_array(),
-        }
+        };
+        (seen, face)
     }
 }

@@ -15,6 +15,7 @@ pub const SIDE: u32 = 64;
 pub struct Squares {
     /// Of the picture, in pixels.
     size: [u32; 2],
+    side: u32,
     /// How many there are across, and down.
     count: [usize; 2],
 }
@@ -22,8 +23,13 @@ pub struct Squares {
 impl Squares {
     /// Of a picture of this view.
     pub fn of(view: &View) -> Self {
+        Self::of_side(view, SIDE)
+    }
+
+    /// The same, but of so many pixels a side.
+    pub fn of_side(view: &View, side: u32) -> Self {
         let size = [view.width, view.height];
-        Self { size, count: size.map(|pixels| pixels.div_ceil(SIDE) as usize) }
+        Self { size, side, count: size.map(|pixels| pixels.div_ceil(side) as usize) }
     }
 
     /// How many there are.
@@ -46,8 +52,9 @@ impl Squares {
         }
         let [columns, rows] = [0, 1].map(|axis| {
             // A pixel more on either side than numbers in f32 can be off. Casts saturate.
-            let square = |pixel: f64| ((pixel / f64::from(SIDE)).max(0.0) as usize).min(self.count[axis]);
-            square(low[axis] - 1.0)..square(high[axis] + 1.0 + f64::from(SIDE))
+            let side = f64::from(self.side);
+            let square = |pixel: f64| ((pixel / side).max(0.0) as usize).min(self.count[axis]);
+            square(low[axis] - 1.0)..square(high[axis] + 1.0 + side)
         });
         rows.flat_map(move |row| columns.clone().map(move |column| row * self.count[0] + column))
     }
@@ -56,7 +63,7 @@ impl Squares {
     pub fn bounds(self, square: usize) -> [f32; 4] {
         let [x, y] = [square % self.count[0], square / self.count[0]];
         let clip = |square: usize, axis: usize| {
-            (2.0 * (square * SIDE as usize) as f64 / f64::from(self.size[axis]) - 1.0) as f32
+            (2.0 * (square * self.side as usize) as f64 / f64::from(self.size[axis]) - 1.0) as f32
         };
         [clip(x, 0), clip(y, 1), clip(x + 1, 0), clip(y + 1, 1)]
     }
