@@ -15,6 +15,8 @@
 #include "gather.glsl"
 #include "add.glsl"
 
+layout(early_fragment_tests) in; // by mark, where there are any
+
 layout(location = 0) out vec4 out_rgba; // premultiplied
 #ifdef DEPTH
 layout(location = 1) out vec4 out_depth; // (distance * alpha, 0, 0, alpha)

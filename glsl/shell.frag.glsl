@@ -20,6 +20,8 @@ layout(location = 4) flat in vec4 texture_rows[3];
 layout(location = 7) flat in uint cell_index;
 #endif
 
+layout(early_fragment_tests) in; // by mark, where there are any
+
 layout(location = 0) out vec4 out_rgba; // premultiplied
 #ifdef DEPTH
 layout(location = 1) out vec4 out_depth; // (distance * alpha, 0, 0, alpha)

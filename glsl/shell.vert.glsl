@@ -26,5 +26,6 @@ void main() {
 #endif
     uint corner = CORNERS[gl_VertexIndex % 6];
     vec4 pair = cell.outline[corner / 2];
-    gl_Position = vec4(corner % 2 == 0 ? pair.xy : pair.zw, 0.0, 1.0);
+    const float nearness = 0.5; // between the marks of pixels in which it is seen, and in which not
+    gl_Position = vec4(corner % 2 == 0 ? pair.xy : pair.zw, nearness, 1.0);
 }

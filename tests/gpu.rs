@@ -7,7 +7,7 @@ use std::sync::Arc;
 use glam::{DVec2, DVec3};
 use mesoshell::Error;
 use mesoshell::gpu::{
-    Batch, Buffer, DeviceChoice, Draw, Gpu, Keeps, Messages, Pipeline, PipelineInfo, Sampled, Target,
+    Batch, Buffer, DeviceChoice, Draw, Gpu, Keeps, Marked, Messages, Pipeline, PipelineInfo, Sampled, Target,
     Texture3d, devices, draw, shaders,
 };
 use mesoshell::mesh::Mesh;
@@ -89,9 +89,9 @@ fn a_volume_over_the_limit_is_refused() {
 fn a_picture_over_the_limit_is_refused() {
     watched(|gpu| {
         let limit = gpu.info().max_image_2d;
-        let error = Target::new(gpu, [limit + 1, 1], 1, false).unwrap_err();
+        let error = Target::new(gpu, [limit + 1, 1], 1, Marked::Never).unwrap_err();
         assert!(matches!(error, Error::Device { .. }), "{error:?}");
-        Target::new(gpu, [64, 64], 2, false).expect("a small one");
+        Target::new(gpu, [64, 64], 2, Marked::Never).expect("a small one");
     });
 }
 
@@ -99,7 +99,7 @@ fn a_picture_over_the_limit_is_refused() {
 fn a_picture_without_pixels_is_refused() {
     watched(|gpu| {
         for [width, height] in [[0, 1], [1, 0]] {
-            let error = Target::new(gpu, [width, height], 1, false).unwrap_err();
+            let error = Target::new(gpu, [width, height], 1, Marked::Never).unwrap_err();
             assert!(matches!(error, Error::Usage { .. }), "{error:?}");
         }
     });
@@ -135,7 +135,7 @@ fn a_picture_larger_than_memory_is_refused() {
             bytes > gpu.info().memory_bytes,
             "64 targets of the largest size fit: this machine is too large for the test"
         );
-        let error = Target::new(gpu, [limit, limit], 64, false).unwrap_err();
+        let error = Target::new(gpu, [limit, limit], 64, Marked::Never).unwrap_err();
         assert!(matches!(error, Error::OutOfMemory { .. }), "{error:?}");
     });
 }
@@ -144,7 +144,7 @@ fn a_picture_larger_than_memory_is_refused() {
 fn a_draw_whose_parts_do_not_fit_reaches_no_device() {
     watched(|gpu| {
         let other = Gpu::open(&DeviceChoice::Any, None).unwrap();
-        let target = |gpu, attachments| Target::new(gpu, [4, 4], attachments, false).unwrap();
+        let target = |gpu, attachments| Target::new(gpu, [4, 4], attachments, Marked::Never).unwrap();
         let bytes = size_of::<ViewConstants>();
         let pipeline = Pipeline::new(gpu, &target(gpu, 1), &shell_pipeline(bytes as u32)).unwrap();
         let buffer = |gpu| Buffer::storage(gpu, "nothing", &[0u32; 64]).unwrap();
@@ -174,7 +174,7 @@ fn a_draw_whose_parts_do_not_fit_reaches_no_device() {
             let wrong = || Pipeline::new(gpu, &target(gpu, 1), &info);
             assert!(catch_unwind(AssertUnwindSafe(wrong)).is_err(), "{keeps:?}: the target has no depths");
         }
-        let marked = Target::new(gpu, [4, 4], 1, true).unwrap();
+        let marked = Target::new(gpu, [4, 4], 1, Marked::Apart).unwrap();
         assert!(!draws(&marked, &[&own; 3], bytes), "a pipeline for targets without marks");
     });
 }
@@ -185,7 +185,7 @@ fn what_the_layers_say_is_heard() {
     // and the bindings are right: a driver may crash at wrong ones while it compiles.)
     let messages = Messages::default();
     let gpu = Gpu::open(&DeviceChoice::Any, Some(&messages)).unwrap();
-    let target = Target::new(&gpu, [4, 4], 1, false).unwrap();
+    let target = Target::new(&gpu, [4, 4], 1, Marked::Never).unwrap();
     let _ = Pipeline::new(&gpu, &target, &shell_pipeline(4));
     assert!(!messages.all().is_empty());
 }

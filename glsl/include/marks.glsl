@@ -4,3 +4,6 @@
 const float ALONE_MARK = 0.0;     // the shell, one part at a time
 const float NOTHING_MARK = 0.5;
 const float INTRICATE_MARK = 1.0; // several parts of it at once
+
+// Where tetrahedra are sorted: nothing more is seen there. Else the mark is 0.
+const float SATURATED_MARK = 1.0;

@@ -11,7 +11,7 @@ use super::buffer::Buffer;
 use super::device::{Gpu, vulkan_error};
 use super::pipeline::Pipeline;
 use super::submit::submit;
-use super::target::Target;
+use super::target::{ITSELF, Target};
 use super::texture::Texture3d;
 use crate::Result;
 
@@ -112,7 +112,7 @@ pub fn draw(draw: &Draw<'_>) -> Result<Option<DrawTimes>> {
     for Batch { pipeline, .. } in draw.batches {
         if !bound.iter().any(|one| std::ptr::eq(*one, *pipeline)) {
             pipeline.check(draw);
-            pipeline.bind(draw.buffers, draw.textures);
+            pipeline.bind(draw);
             bound.push(pipeline);
         }
     }
@@ -212,8 +212,8 @@ fn submit_part(
             gpu.raw.cmd_set_viewport(commands, 0, &[viewport]);
             gpu.raw.cmd_set_scissor(commands, 0, &[area]);
             let mut bound = None;
+            let raw = &gpu.raw;
             for Batch { pipeline, vertices } in batches {
-                let raw = &gpu.raw;
                 // Drivers that are asked to bind what is bound do it all again.
                 if bound != Some(pipeline.raw) {
                     bound = Some(pipeline.raw);
@@ -224,7 +224,14 @@ fn submit_part(
                     let stages = vk::ShaderStageFlags::VERTEX | vk::ShaderStageFlags::FRAGMENT;
                     raw.cmd_push_constants(commands, pipeline.layout, stages, 0, draw.push_constants);
                 }
+                let [before, after] = ITSELF;
+                if pipeline.reads_picture() {
+                    wait_within(gpu, commands, before);
+                }
                 raw.cmd_draw(commands, vertices.len() as u32, 1, vertices.start, 0);
+                if pipeline.reads_picture() {
+                    wait_within(gpu, commands, after);
+                }
             }
             gpu.raw.cmd_end_render_pass(commands);
         }
@@ -234,6 +241,18 @@ fn submit_part(
         }
         stamp(commands, vk::PipelineStageFlags::TRANSFER, 2);
     })
+}
+
+/// Lets what is drawn next wait for what was drawn, as one of [`ITSELF`] says.
+fn wait_within(
+    gpu: &Gpu,
+    commands: vk::CommandBuffer,
+    [from, to]: [(vk::PipelineStageFlags, vk::AccessFlags); 2],
+) {
+    let barrier = [vk::MemoryBarrier::default().src_access_mask(from.1).dst_access_mask(to.1)];
+    let by_region = vk::DependencyFlags::BY_REGION;
+    // SAFETY: recorded in a render pass that has this dependency on itself.
+    unsafe { gpu.raw.cmd_pipeline_barrier(commands, from.0, to.0, by_region, &barrier, &[], &[]) };
 }
 
 fn copy_to_host(gpu: &Gpu, commands: vk::CommandBuffer, target: &Target) {

@@ -8,7 +8,7 @@ use ash::vk;
 use super::device::Gpu;
 use super::pipeline::{Keeps, Pipeline, PipelineInfo};
 use super::texture::Texture3d;
-use super::{Batch, Draw, Sampled, Target, draw, shaders};
+use super::{Batch, Draw, Marked, Sampled, Target, draw, shaders};
 use crate::Result;
 
 /// So many places between two levels are tried.
@@ -35,7 +35,7 @@ impl Gpu {
 fn measure(gpu: &Arc<Gpu>) -> Result<bool> {
     let levels = [([2; 3], &[[0.0; 4]; 8][..]), ([1; 3], &[[1.0; 4]][..])];
     let texture = Texture3d::upload_colours(gpu, "levels of detail", &levels, vk::SamplerMipmapMode::LINEAR)?;
-    let target = Target::new(gpu, [PLACES, 1], 1, false)?;
+    let target = Target::new(gpu, [PLACES, 1], 1, Marked::Never)?;
     let info = PipelineInfo {
         vertex: shaders::LAYER_VERT.with(&[]),
         fragment: shaders::LEVELS_FRAG.with(&[]),

@@ -26,5 +26,5 @@ pub use device::{DeviceChoice, Gpu};
 pub use draw::{Batch, Draw, DrawTimes, Sampled, draw};
 pub use instance::{DeviceInfo, Messages, devices};
 pub use pipeline::{Keeps, Pipeline, PipelineInfo};
-pub use target::Target;
+pub use target::{Marked, Target};
 pub use texture::Texture3d;

@@ -14,6 +14,9 @@ use super::shaders::Spirv;
 use super::target::Target;
 use crate::Result;
 
+/// The binding in set 0 by which shaders read the pixel that they mark.
+pub const PICTURE: u32 = 24;
+
 /// What becomes of several fragments of a pixel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Keeps {
@@ -26,6 +29,9 @@ pub enum Keeps {
     Nearest,
     /// None: each marks its pixel by its depth value, for targets that have marks.
     Marks,
+    /// The same, for targets that are marked by what was drawn: the shader may read its pixel, as the input attachment at binding
+    /// [`PICTURE`].
+    MarksByPicture,
     /// As `Blend`, and only of pixels whose mark is less than its depth value. Shaders should test that before they run.
     BlendAbove,
     /// As `Blend`, and only of pixels whose mark is greater than its depth value.
@@ -70,13 +76,16 @@ pub struct Pipeline {
     uniform_buffers: Vec<u32>,
     texel_buffers: Vec<u32>,
     textures: Vec<u32>,
+    /// [`PICTURE`], where that is read.
+    input_attachments: Vec<u32>,
     minified: bool,
     push_constant_bytes: u32,
     /// Of the targets that it draws into.
     format: Rgba,
     attachments: usize,
-    /// Whether they have depths.
+    /// Whether they have depths, and read themselves.
     has_depths: bool,
+    reads_itself: bool,
     gpu: Arc<Gpu>,
     // One thread at a time binds and draws.
     not_shared: PhantomData<Cell<()>>,
@@ -96,13 +105,15 @@ impl Pipeline {
         let blends = matches!(info.keeps, Keeps::Blend | Keeps::BlendAbove | Keeps::BlendBelow);
         let depths = match info.keeps {
             Keeps::Nearest => Some((vk::CompareOp::GREATER, true)),
-            Keeps::Marks => Some((vk::CompareOp::ALWAYS, true)),
+            Keeps::Marks | Keeps::MarksByPicture => Some((vk::CompareOp::ALWAYS, true)),
             Keeps::BlendAbove => Some((vk::CompareOp::GREATER, false)),
             Keeps::BlendBelow => Some((vk::CompareOp::LESS, false)),
             Keeps::Blend | Keeps::Last => None,
         };
         let has_depths = target.depth.is_some();
+        let reads_itself = info.keeps == Keeps::MarksByPicture;
         assert!(depths.is_none() || has_depths, "a target for the other kind of pipeline");
+        assert!(!reads_itself || target.reads_itself, "a target that is not marked by what was drawn");
         assert!((4..=128).contains(&info.push_constant_bytes) && info.push_constant_bytes.is_multiple_of(4));
         // From here on `Drop` cleans up, null handles included.
         let mut pipeline = Self {
@@ -115,11 +126,13 @@ impl Pipeline {
             uniform_buffers: info.uniform_buffers.to_vec(),
             texel_buffers: info.texel_buffers.to_vec(),
             textures: info.textures.to_vec(),
+            input_attachments: if info.keeps == Keeps::MarksByPicture { vec![PICTURE] } else { Vec::new() },
             minified: info.minified,
             push_constant_bytes: info.push_constant_bytes,
             format: target.format,
             attachments: target.attachments(),
             has_depths,
+            reads_itself: target.reads_itself,
             gpu: gpu.clone(),
             not_shared: PhantomData,
         };
@@ -168,7 +181,7 @@ impl Pipeline {
                 dst_alpha_blend_factor: vk::BlendFactor::ONE,
                 alpha_blend_op: vk::BlendOp::ADD,
                 color_write_mask: match info.keeps {
-                    Keeps::Marks => vk::ColorComponentFlags::empty(),
+                    Keeps::Marks | Keeps::MarksByPicture => vk::ColorComponentFlags::empty(),
                     _ => vk::ColorComponentFlags::RGBA,
                 },
             };
@@ -212,6 +225,7 @@ impl Pipeline {
             (&self.uniform_buffers, vk::DescriptorType::UNIFORM_BUFFER, vk::ShaderStageFlags::FRAGMENT),
             (&self.texel_buffers, vk::DescriptorType::UNIFORM_TEXEL_BUFFER, vk::ShaderStageFlags::FRAGMENT),
             (&self.textures, vk::DescriptorType::COMBINED_IMAGE_SAMPLER, vk::ShaderStageFlags::FRAGMENT),
+            (&self.input_attachments, vk::DescriptorType::INPUT_ATTACHMENT, vk::ShaderStageFlags::FRAGMENT),
         ];
         for (numbers, kind, stages) in kinds {
             bindings.extend(numbers.iter().map(|&binding| {
@@ -262,7 +276,8 @@ impl Pipeline {
             .chain([&draw.target.gpu]);
         assert!(devices.into_iter().all(|gpu| Arc::ptr_eq(gpu, &self.gpu)), "objects of several devices");
         assert_eq!((draw.target.format, draw.target.attachments()), (self.format, self.attachments));
-        assert_eq!(draw.target.depth.is_some(), self.has_depths, "a target for the other kind of pipeline");
+        let kind = (draw.target.depth.is_some(), draw.target.reads_itself);
+        assert_eq!(kind, (self.has_depths, self.reads_itself), "a target for the other kind of pipeline");
         for (_, texture) in draw.textures {
             if let Sampled::Picture(picture) = texture {
                 assert!(picture.sampler != vk::Sampler::null(), "a target that shaders cannot read");
@@ -272,8 +287,14 @@ impl Pipeline {
         assert_eq!(draw.push_constants.len(), self.push_constant_bytes as usize);
     }
 
-    /// Panics where a binding of the pipeline is not among those given.
-    pub(super) fn bind(&self, buffers: &[(u32, &Buffer)], textures: &[(u32, Sampled<'_>)]) {
+    /// Whether its shader reads the pixel that it marks.
+    pub(super) fn reads_picture(&self) -> bool {
+        !self.input_attachments.is_empty()
+    }
+
+    /// Panics where a binding of the pipeline is not among those that `draw` gives.
+    pub(super) fn bind(&self, draw: &Draw<'_>) {
+        let Draw { target, buffers, textures, .. } = draw;
         let buffer = |binding: &u32| -> &Buffer {
             let (_, buffer) =
                 buffers.iter().find(|(one, _)| one == binding).expect("a buffer for each binding");
@@ -311,6 +332,16 @@ impl Pipeline {
         for (binding, info) in self.textures.iter().zip(&image_infos) {
             writes.push(
                 write(binding).descriptor_type(vk::DescriptorType::COMBINED_IMAGE_SAMPLER).image_info(info),
+            );
+        }
+        let picture = [vk::DescriptorImageInfo {
+            sampler: vk::Sampler::null(),
+            image_view: target.images[0].view,
+            image_layout: vk::ImageLayout::GENERAL,
+        }];
+        for binding in &self.input_attachments {
+            writes.push(
+                write(binding).descriptor_type(vk::DescriptorType::INPUT_ATTACHMENT).image_info(&picture),
             );
         }
         // SAFETY: the set is in no pending submission, since each is waited for, by the only thread that has the pipeline;

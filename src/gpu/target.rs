@@ -21,6 +21,8 @@ pub struct Target {
     pub(super) images: Vec<DeviceImage>,
     /// That the nearest of several surfaces is kept by, or by which pixels are marked; and its format.
     pub(super) depth: Option<(DeviceImage, vk::Format)>,
+    /// Whether shaders that draw into it may read the first image, of their own pixel.
+    pub(super) reads_itself: bool,
     /// What the host reads; none for shaders.
     pub(super) readbacks: Vec<Buffer>,
     /// What shaders read through; null for the host.
@@ -38,12 +40,23 @@ pub struct Target {
     not_shared: PhantomData<Cell<()>>,
 }
 
+/// By what the pixels of a target can be marked, so that no more is drawn there.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Marked {
+    /// Nothing.
+    Never,
+    /// What shaders know without it: [`Keeps::Marks`](super::Keeps::Marks).
+    Apart,
+    /// What was drawn there, too: [`Keeps::MarksByPicture`](super::Keeps::MarksByPicture).
+    ByPicture,
+}
+
 /// Who reads a target.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum ReadBy {
     /// From a copy in its memory. With a depth image, where pixels are `marked`.
     Host {
-        /// See [`Keeps::Marks`](super::Keeps::Marks).
+        /// See [`Marked`].
         marked: bool,
     },
     /// With a depth image, where the `nearest` is kept.
@@ -53,14 +66,26 @@ pub(super) enum ReadBy {
     },
 }
 
+/// What waits for what where a target reads itself: before it is read, and after.
+pub(super) const ITSELF: [[(vk::PipelineStageFlags, vk::AccessFlags); 2]; 2] = {
+    let written = (
+        vk::PipelineStageFlags::COLOR_ATTACHMENT_OUTPUT,
+        vk::AccessFlags::from_raw(
+            vk::AccessFlags::COLOR_ATTACHMENT_WRITE.as_raw()
+                | vk::AccessFlags::COLOR_ATTACHMENT_READ.as_raw(),
+        ),
+    );
+    let read = (vk::PipelineStageFlags::FRAGMENT_SHADER, vk::AccessFlags::INPUT_ATTACHMENT_READ);
+    [[written, read], [read, written]]
+};
+
 /// Of surfaces.
 const DEPTH_FORMAT: vk::Format = vk::Format::D32_SFLOAT;
 /// Of marks: Vulkan has every device draw into it.
 const MARK_FORMAT: vk::Format = vk::Format::D16_UNORM;
 
 impl Target {
-    /// `attachments` images of `width x height` pixels that the host reads, in the most accurate format that the device blends; pixels
-    /// can be `marked`.
+    /// `attachments` images of `width x height` pixels that the host reads, in the most accurate format that the device blends.
     ///
     /// # Errors
     /// [`Error::Usage`] where a side is 0; [`Error::Device`] where one is longer than the device allows;
@@ -68,13 +93,20 @@ impl Target {
     ///
     /// # Panics
     /// Where there are no attachments.
-    pub fn new(gpu: &Arc<Gpu>, [width, height]: [u32; 2], attachments: usize, marked: bool) -> Result<Self> {
+    pub fn new(
+        gpu: &Arc<Gpu>,
+        [width, height]: [u32; 2],
+        attachments: usize,
+        marked: Marked,
+    ) -> Result<Self> {
         let name = "the picture";
-        let (format, bytes) = Self::check(gpu, name, [width, height], attachments, ReadBy::Host { marked })?;
+        let read_by = ReadBy::Host { marked: marked != Marked::Never };
+        let (format, bytes) = Self::check(gpu, name, [width, height], attachments, read_by)?;
         let mut target = Self::empty(gpu, name, format, [width, height], [attachments, 1])?;
-        if marked {
+        if marked != Marked::Never {
             target.keep_depths(name, MARK_FORMAT)?;
         }
+        target.reads_itself = marked == Marked::ByPicture;
         target.readbacks =
             (0..attachments).map(|_| Buffer::readback(gpu, "the picture", bytes)).collect::<Result<_>>()?;
         target.finish()
@@ -141,7 +173,8 @@ impl Target {
         let layers = u32::try_from(layers).expect("few attachments");
         let usage = vk::ImageUsageFlags::COLOR_ATTACHMENT
             | vk::ImageUsageFlags::TRANSFER_SRC
-            | vk::ImageUsageFlags::SAMPLED;
+            | vk::ImageUsageFlags::SAMPLED
+            | vk::ImageUsageFlags::INPUT_ATTACHMENT;
         let info = image_info(format.raw(), [width, height], layers, usage);
         let view = if layers > 1 { vk::ImageViewType::TYPE_2D_ARRAY } else { vk::ImageViewType::TYPE_2D };
         let aspect = vk::ImageAspectFlags::COLOR;
@@ -153,6 +186,7 @@ impl Target {
             height,
             images,
             depth: None,
+            reads_itself: false,
             readbacks: Vec::new(),
             sampler: vk::Sampler::null(),
             clearing: vk::RenderPass::null(),
@@ -325,12 +359,12 @@ fn render_pass(target: &Target, clears: bool) -> Result<vk::RenderPass> {
         descriptions.push(description(format, depth_layout));
     }
     let count = u32::try_from(target.attachments()).expect("few attachments");
-    let references: Vec<vk::AttachmentReference> = (0..count)
-        .map(|attachment| vk::AttachmentReference {
-            attachment,
-            layout: vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL,
-        })
-        .collect();
+    let layout = match target.reads_itself {
+        true => vk::ImageLayout::GENERAL,
+        false => vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL,
+    };
+    let references: Vec<vk::AttachmentReference> =
+        (0..count).map(|attachment| vk::AttachmentReference { attachment, layout }).collect();
     let depth_reference = vk::AttachmentReference { attachment: count, layout: depth_layout };
     let mut subpass = vk::SubpassDescription::default()
         .pipeline_bind_point(vk::PipelineBindPoint::GRAPHICS)
@@ -347,7 +381,7 @@ fn render_pass(target: &Target, clears: bool) -> Result<vk::RenderPass> {
         accesses |=
             vk::AccessFlags::DEPTH_STENCIL_ATTACHMENT_WRITE | vk::AccessFlags::DEPTH_STENCIL_ATTACHMENT_READ;
     }
-    let dependencies = [
+    let mut dependencies = vec![
         // The clear waits for the reads of the frame before, what goes on for what was drawn before.
         vk::SubpassDependency::default()
             .src_subpass(vk::SUBPASS_EXTERNAL)
@@ -365,6 +399,19 @@ fn render_pass(target: &Target, clears: bool) -> Result<vk::RenderPass> {
             .dst_stage_mask(read_stage)
             .dst_access_mask(reads),
     ];
+    if target.reads_itself {
+        subpass = subpass.input_attachments(&references[..1]);
+        dependencies.extend(ITSELF.map(|[from, to]| {
+            vk::SubpassDependency::default()
+                .src_subpass(0)
+                .dst_subpass(0)
+                .src_stage_mask(from.0)
+                .src_access_mask(from.1)
+                .dst_stage_mask(to.0)
+                .dst_access_mask(to.1)
+                .dependency_flags(vk::DependencyFlags::BY_REGION)
+        }));
+    }
     let subpasses = [subpass];
     let info = vk::RenderPassCreateInfo::default()
         .attachments(&descriptions)

@@ -39,7 +39,7 @@ impl Skip {
         match self {
             Self::EmptySpace => "rays leap over places where nothing of the volume is",
             Self::EvenSpace => "where the volume is one medium, the same all around, several steps are one",
-            Self::Saturation => "rays that walk end where next to nothing is let through, march.end_below",
+            Self::Saturation => "rays end where next to nothing is let through, march.end_below",
             Self::Levels => "where all is magnified, no coarser level of detail is compiled in",
             Self::Kept => {
                 "order, what is seen, and shadows are kept where they are as they were in the frame before"

@@ -7,9 +7,13 @@ use super::solids::SolidView;
 use super::squares;
 use super::walk::{RayBuffers, Ways};
 use super::{Shell, Sight};
-use crate::gpu::{Batch, Buffer, Keeps, Pipeline, PipelineInfo, Target, shaders};
+use crate::gpu::{Batch, Buffer, Keeps, Marked, Pipeline, PipelineInfo, Target, shaders};
 use crate::scene::{Model, Skip, View};
 use crate::{Error, Result};
+
+/// Where tetrahedra are sorted, the parts of them after which pixels are looked for in which no more is seen: docs/speed.md has what
+/// more of them, or fewer, take.
+const LOOKS: &[f64] = &[0.25, 0.5, 0.75];
 
 /// The target of a picture and the pipeline that draws into it.
 pub(super) struct Canvas {
@@ -30,6 +34,8 @@ enum Medium {
         pipeline: Pipeline,
         /// For cycles, where there are any.
         cycle: Option<Pipeline>,
+        /// Marks pixels in which no more is seen, if that is looked for.
+        saturated: Option<Pipeline>,
         tiles: Buffer,
         list: Buffer,
     },
@@ -72,7 +78,7 @@ impl Canvas {
     /// What is drawn of the medium, in order.
     pub(super) fn batches(&self, seen: &Seen) -> Vec<Batch<'_>> {
         match &self.medium {
-            Medium::Sorted { pipeline, cycle, .. } => {
+            Medium::Sorted { pipeline, cycle, saturated, .. } => {
                 let batch = |run: &Run| {
                     let (pipeline, quads) = match run {
                         Run::Sorted(cells) => (pipeline, cells),
@@ -80,7 +86,15 @@ impl Canvas {
                     };
                     Batch { pipeline, vertices: 6 * quads.start..6 * quads.end }
                 };
-                seen.runs.iter().map(batch).collect()
+                let Some(saturated) = saturated else { return seen.runs.iter().map(batch).collect() };
+                let mut batches = Vec::new();
+                for (index, part) in seen.parts(LOOKS).iter().enumerate() {
+                    if index > 0 {
+                        batches.push(Batch { pipeline: saturated, vertices: 0..3 });
+                    }
+                    batches.extend(part.iter().map(batch));
+                }
+                batches
             }
             Medium::Walked { mark, pipeline, magnified, together, .. } => {
                 let end = 6 * seen.minified_squares.len() as u32;
@@ -113,6 +127,8 @@ pub(super) struct CanvasKind {
     /// Whether anything is resolved pixel by pixel.
     cycles: bool,
     walks: bool,
+    /// Whether pixels are looked for in which no more is seen of what is sorted.
+    looks: bool,
     /// Whether there are squares in which all is magnified, and others.
     partly_magnified: bool,
     /// What is compiled into the shaders: what the scene has, and what is asked for.
@@ -192,6 +208,7 @@ impl Shell {
                 Sight::Walked(crossings) => crossings.overlapping > 0,
             },
             walks: matches!(sight, Sight::Walked(_)),
+            looks: matches!(sight, Sight::Sorted(_)) && self.ends_where_saturated(),
             partly_magnified: match sight {
                 Sight::Walked(crossings) if skips.allow(Skip::Levels) => {
                     seen.is_worth_parting(crossings, view)
@@ -209,7 +226,12 @@ impl Shell {
 
     fn new_canvas(&self, kind: CanvasKind, sight: &Sight, seen: &Seen, view: &View) -> Result<Canvas> {
         let attachments = if kind.depth { 2 } else { 1 };
-        let target = Target::new(&self.gpu, [kind.width, kind.height], attachments, kind.walks)?;
+        let marked = match (kind.walks, kind.looks) {
+            (true, _) => Marked::Apart,
+            (false, true) => Marked::ByPicture,
+            (false, false) => Marked::Never,
+        };
+        let target = Target::new(&self.gpu, [kind.width, kind.height], attachments, marked)?;
         let on = &kind.switches;
         let mut uniform_buffers = Vec::new();
         let buffers = if kind.walks { Vec::new() } else { vec![0, 1, 2] };
@@ -245,15 +267,29 @@ impl Shell {
         };
         let (cells, medium) = match sight {
             Sight::Sorted(_) => {
+                let keeps = if kind.looks { Keeps::BlendAbove } else { Keeps::Blend };
+                let info = PipelineInfo { keeps, ..info };
                 let of_cycles = PipelineInfo {
                     vertex: shaders::TILE_VERT.with(on),
                     fragment: shaders::CYCLE_FRAG.with(on),
                     ..info
                 };
                 let cycle = kind.cycles.then(|| Pipeline::new(&self.gpu, &target, &of_cycles));
+                let saturated = PipelineInfo {
+                    vertex: shaders::LAYER_VERT.with(&[]),
+                    fragment: shaders::SATURATED_FRAG.with(&[]),
+                    storage_buffers: &[],
+                    uniform_buffers: &[],
+                    texel_buffers: &[],
+                    textures: &[],
+                    keeps: Keeps::MarksByPicture,
+                    ..info
+                };
+                let saturated = kind.looks.then(|| Pipeline::new(&self.gpu, &target, &saturated));
                 let medium = Medium::Sorted {
                     pipeline: Pipeline::new(&self.gpu, &target, &info)?,
                     cycle: cycle.transpose()?,
+                    saturated: saturated.transpose()?,
                     tiles: Buffer::storage(&self.gpu, "the tiles of cycles", &seen.tiles)?,
                     list: Buffer::storage(&self.gpu, "the tetrahedra in order", &seen.list)?,
                 };

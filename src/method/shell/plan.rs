@@ -22,7 +22,7 @@ pub(super) fn enough_to_leap(scene: &Scene) -> Enough {
     Enough { empty: may(Skip::EmptySpace).then_some(sparse), even: may(Skip::EvenSpace).then_some(EVEN) }
 }
 
-/// Where rays that walk end, for people.
+/// Where rays end, for people.
 pub(super) fn where_rays_end(scene: &Scene) -> String {
     match scene.end_below {
         0.0 => "rays end where nothing is let through".to_owned(),
@@ -42,6 +42,11 @@ impl Shell {
             && matches!(self.scene.march, March::Default { .. })
             && wanted_samples(self.scene.march, self.texels) <= MOST_SAMPLES
             && self.has_room(view)
+    }
+
+    /// Whether no more is drawn where no more is seen.
+    pub(super) fn ends_where_saturated(&self) -> bool {
+        self.scene.skips.allow(Skip::Saturation) && matches!(self.scene.march, March::Default { .. })
     }
 
     /// See [`Method::plan`](crate::method::Method::plan).
@@ -77,12 +82,12 @@ impl Shell {
         let even =
             format!("{:.0} % of the volume is one medium without directions", 100.0 * self.volume.evenness());
         let even = leap(Skip::EvenSpace, enough.even, is_even, even);
-        let saturation = if !walks {
-            "all that is sorted is drawn".to_owned()
-        } else if allows(Skip::Saturation) {
+        let saturation = if !allows(Skip::Saturation) {
+            switched_off()
+        } else if self.ends_where_saturated() {
             where_rays_end(&self.scene)
         } else {
-            switched_off()
+            format!("the {} draws all", self.scene.march)
         };
         let levels = if allows(Skip::Levels) { "asked of each view" } else { "it is switched off" };
         let kept = if allows(Skip::Kept) { "compared with the frame before" } else { "it is switched off" };
@@ -94,7 +99,7 @@ impl Shell {
             choice("traversal", walk.0, walk.1),
             choice(Skip::EmptySpace.name(), on(is_sparse), empty),
             choice(Skip::EvenSpace.name(), on(is_even), even),
-            choice(Skip::Saturation.name(), on(walks && allows(Skip::Saturation)), saturation),
+            choice(Skip::Saturation.name(), on(self.ends_where_saturated()), saturation),
             choice(Skip::Levels.name(), on(allows(Skip::Levels)), levels.to_owned()),
             choice(Skip::Kept.name(), on(allows(Skip::Kept)), kept.to_owned()),
             choice(

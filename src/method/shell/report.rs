@@ -57,10 +57,10 @@ impl Shell {
                 report
                     .skipped
                     .push("each ray walks from tetrahedron to tetrahedron: nothing is sorted".into());
-                if self.scene.skips.allow(Skip::Saturation) {
-                    report.skipped.push(where_rays_end(&self.scene));
-                }
             }
+        }
+        if self.ends_where_saturated() {
+            report.skipped.push(where_rays_end(&self.scene));
         }
         if self.volume.is_sparse() {
             report.skipped.push("rays leap over what is empty".into());

@@ -152,6 +152,27 @@ impl Seen {
         seen
     }
 
+    /// The runs in parts, each after such a part of all that is in [`Seen::list`].
+    pub fn parts(&self, after: &[f64]) -> Vec<Vec<Run>> {
+        let mut parts = vec![Vec::new()];
+        let mut looks = after.iter().map(|part| (part * self.list.len() as f64) as u32).peekable();
+        for run in &self.runs {
+            let Run::Sorted(Range { mut start, end }) = run.clone() else {
+                parts.last_mut().expect("one at least").push(run.clone());
+                continue;
+            };
+            while let Some(look) = looks.next_if(|look| *look < end) {
+                if look > start {
+                    parts.last_mut().expect("one at least").push(Run::Sorted(start..look));
+                    start = look;
+                }
+                parts.push(Vec::new());
+            }
+            parts.last_mut().expect("one at least").push(Run::Sorted(start..end));
+        }
+        parts
+    }
+
     fn add_sorted(&mut self, tetrahedra: &[u32], found: &[Found]) {
         let first = self.list.len() as u32;
         for &t in tetrahedra {

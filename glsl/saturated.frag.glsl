@@ -1,0 +1,14 @@
+#version 450
+#extension GL_ARB_shading_language_include : require
+// Marks pixels through which next to nothing is let: nothing more is drawn there.
+
+#include "marks.glsl"
+
+layout(input_attachment_index = 0, set = 0, binding = 24) uniform subpassInput picture;
+
+layout(constant_id = 6) const float SATURATED = 0.0; // of march.glsl
+
+void main() {
+    if (!(1.0 - subpassLoad(picture).a <= SATURATED)) discard;
+    gl_FragDepth = SATURATED_MARK;
+}
