@@ -231,6 +231,9 @@ fn render(arguments: &Arguments, line: &Arc<Line>, interrupt: &Interrupt, talk: 
 
 /// What is chosen.
 fn chosen(plan: &[Choice]) -> String {
+    if plan.is_empty() {
+        return "chosen: nothing, for there is one way\n".to_owned();
+    }
     let chosen = |choice: &Choice| format!("{:4}  {}", choice.chosen, choice.why);
     format!("chosen:\n{}", table(plan.iter().map(|choice| (choice.about, chosen(choice)))))
 }
@@ -238,18 +241,28 @@ fn chosen(plan: &[Choice]) -> String {
 /// What came of it.
 fn explain(savings: &[Saving], report: &Report) -> String {
     let saved = |saving: &Saving| {
-        let Saving { with, without, difference, .. } = saving;
-        format!(
-            "{:9.2} ms of {without:.2} ms without it; the picture differs by {difference:.1e}",
-            without - with
-        )
+        let Saving { with, without, noise, difference, .. } = saving;
+        let saved = without - with;
+        let noise = if saved.abs() > *noise {
+            String::new()
+        } else {
+            format!(" (no more than frames that are alike differ by, {noise:.2} ms)")
+        };
+        format!("{saved:9.2} ms{noise} of {without:.2} ms without it; the picture differs by {difference:.1e}")
     };
-    let saved = table(savings.iter().map(|saving| (saving.skip.name(), saved(saving))));
+    let saved = match savings {
+        [] => String::new(),
+        _ => format!(
+            "saved, where the eye stays where it is:\n{}\n",
+            table(savings.iter().map(|saving| (saving.skip.name(), saved(saving))))
+        ),
+    };
     let counts = table(report.counts.iter().map(|(name, count)| (name.as_str(), format!("{count:9}"))));
-    let skipped: String = report.skipped.iter().map(|skipped| format!("  - {skipped}\n")).collect();
-    format!(
-        "left out:\n{skipped}saved, where the eye stays where it is:\n{saved}\ncounted:\n{counts}\ntook:\n"
-    )
+    let skipped: String = match &*report.skipped {
+        [] => "left out: nothing\n".to_owned(),
+        skipped => skipped.iter().fold("left out:\n".to_owned(), |text, skipped| text + "  - " + skipped + "\n"),
+    };
+    format!("{skipped}{saved}counted:\n{counts}\ntook:\n")
 }
 
 fn skips() -> PossibleValuesParser {

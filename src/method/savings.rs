@@ -22,6 +22,8 @@ pub struct Saving {
     pub with: f64,
     /// The same frame with nothing but this not left out.
     pub without: f64,
+    /// How far apart, in milliseconds, frames were that are alike: less than this is not known to be a saving.
+    pub noise: f64,
     /// The largest difference of a channel, linear premultiplied, between the two.
     pub difference: f64,
 }
@@ -43,25 +45,26 @@ pub fn savings(entry: &Entry, plan: &[Choice], scene: &Scene, setup: &Setup<'_>)
         let scene = Arc::new(Scene { skips, ..scene.clone() });
         let mut method = entry.prepare(scene.clone(), &setup_of_frames)?;
         let mut frame = method.render(&scene.view)?;
-        let mut fastest = f64::INFINITY;
+        let (mut fastest, mut slowest) = (f64::INFINITY, 0.0_f64);
         for _ in 0..FRAMES {
             let start = Instant::now();
             frame = method.render(&scene.view)?;
-            fastest = fastest.min(1e3 * start.elapsed().as_secs_f64());
+            let milliseconds = 1e3 * start.elapsed().as_secs_f64();
+            (fastest, slowest) = (fastest.min(milliseconds), slowest.max(milliseconds));
         }
-        Ok::<_, Error>((frame, fastest))
+        Ok::<_, Error>((frame, fastest, slowest - fastest))
     };
     setup.progress.stage("measuring what was saved");
-    let (frame, with) = draw(scene.skips)?;
+    let (frame, with, apart) = draw(scene.skips)?;
     let mut savings = Vec::new();
     for (index, &skip) in on.iter().enumerate() {
         setup.progress.fraction((index + 1) as f64 / (on.len() + 1) as f64);
         setup.interrupt.check()?;
         let off: Vec<Skip> =
             Skip::ALL.into_iter().filter(|&other| other == skip || !scene.skips.allow(other)).collect();
-        let (other, without) = draw(Skips::without(&off))?;
+        let (other, without, other_apart) = draw(Skips::without(&off))?;
         let difference = metric::compare(&frame.image, &other.image)?.max;
-        savings.push(Saving { skip, with, without, difference });
+        savings.push(Saving { skip, with, without, noise: apart.max(other_apart), difference });
     }
     Ok(savings)
 }
