@@ -18,8 +18,11 @@ layout(early_fragment_tests) in; // by depth: else all pixels would be gone thro
 
 layout(location = 1) flat in uint picture;
 
-// Follows the ray to its end; false where that is more than can be resolved.
-bool follow(vec3 origin, vec3 ray) {
+const float LONGEST_STEP = 0.5; // `COARSEST_STEP` of src/method/shell/shadows.rs
+
+// Follows the ray to its end, or finds out how many passes its steps `need`; false where that is more than can be resolved.
+bool follow(vec3 origin, vec3 ray, bool samples, out uint need) {
+    need = 0;
     LightPicture light = light_pictures[picture];
     bool is_parallel = light.is_parallel != 0;
     float per_depth = length(ray) * light.opacity_distances;
@@ -52,7 +55,10 @@ bool follow(vec3 origin, vec3 ray) {
                 if (alone.count > steps.count) steps = alone;
                 present++;
             }
-            passes += AT_ONCE * (end - first + 2) * (steps.count + 3);
+            uint a_step = AT_ONCE * (end - first + 2);
+            need += a_step * steps.count;
+            if (!samples) steps.count = 0;
+            passes += a_step * (steps.count + 3);
             if (passes > MOST_PASSES) break;
             // In a gap there are no steps. Looks are fewer than the passes that were counted for the steps.
             bool is_alone = present == 1;
@@ -81,6 +87,13 @@ bool follow(vec3 origin, vec3 ray) {
 void main() {
     LightRay ray = ray_of(light_pictures[picture]);
     farthest = ray.farthest;
-    if (follow(ray.origin, ray.along)) write_curve();
+    uint need;
+    // Where steps are too many, longer ones are taken, but none longer than the shadows of a march of long steps have.
+    if (view.step < LONGEST_STEP && follow(ray.origin, ray.along, false, need)) {
+        // All but the steps will be gone through again; and in each stretch, which has taken as much as three steps, one more for rounding.
+        uint others = min(passes + passes + passes / 3, MOST_PASSES - 1);
+        longer = clamp(float(need) / float(MOST_PASSES - others), 1.0, LONGEST_STEP / view.step);
+    }
+    if (follow(ray.origin, ray.along, true, need)) write_curve();
     else leave_unresolved();
 }

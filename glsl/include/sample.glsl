@@ -71,11 +71,18 @@ vec4 fetch(Path path, float depth) {
     return fetch_from(volume, path, depth);
 }
 
+#ifdef LIGHT
+float longer = 1.0; // by what steps are longer than the plan's
+#endif
+
 // How many samples the plan gives to a segment: no more than `MOST_SAMPLES` of src/method/shell.
 uint sample_count(Path path, float entry, float exit) {
     if (PLAN == PLAN_PAPER) return view.samples;
     float texel = MINIFIED ? exp2(floor(level_of_detail(path, 0.5 * (entry + exit)))) : 1.0;
     float texels = length(path.from_depth * view.texels) * (exit - entry) / texel;
+#ifdef LIGHT
+    texels /= longer;
+#endif
     return uint(clamp(ceil(texels / view.step), 1.0, 65535.0));
 }
 

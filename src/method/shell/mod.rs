@@ -60,8 +60,6 @@ struct Shell {
     lit: Option<Lit>,
     /// Once they were needed.
     shadows: Option<Shadows>,
-    /// Texels a step of lights' rays, once shorter ones were too many.
-    light_step: Option<f64>,
     /// Where there are any.
     solids: Option<Solids>,
     /// The most that a ray passes in one tetrahedron.
@@ -145,7 +143,6 @@ impl super::Opened for Opened {
             volume,
             lit,
             shadows: None,
-            light_step: None,
             solids,
             texels,
             canvas: None,
@@ -261,7 +258,6 @@ impl Method for Shell {
                 &self.scene,
                 &self.volume,
                 ways,
-                self.light_step,
                 &*self.progress,
                 &self.interrupt,
             )?);
@@ -331,14 +327,8 @@ impl Method for Shell {
             canvas.target.read(1).into_iter().map(mean).collect()
         });
         watch.lap("read");
-        if let Some(shadows) = shadows
-            && let Err(error) = check_shadows(&rgba)
-        {
-            // A device ends what takes too many steps; it need not be that much of the shell lies on the way.
-            self.light_step = Some(shadows.longer_step().ok_or(error)?);
-            self.shadows = None;
-            self.kept = kept;
-            return self.render(view);
+        if shadows.is_some() {
+            check_shadows(&rgba)?;
         }
         let left = left::fill(
             matches!(sight, Sight::Sorted(_)).then_some(&seen),

@@ -4,7 +4,6 @@ use super::canvas::Canvas;
 use super::constants::{MOST_SAMPLES, wanted_samples};
 use super::plan::where_rays_end;
 use super::seen::Seen;
-use super::shadows::finest_step;
 use super::{Shell, Sight};
 use crate::frame::Report;
 use crate::scene::Skip;
@@ -39,12 +38,6 @@ impl Shell {
         }
         if let Some(shadows) = &self.shadows {
             count("shadow_pictures", shadows.pictures() as u64);
-            let (step, finest) = (shadows.step(), finest_step(&self.scene));
-            if step > finest {
-                report.skipped.push(format!(
-                    "rays of lights take steps of {step} texels: by those of the march, {finest}, some take too many"
-                ));
-            }
         }
         if seen.before_near > 0 {
             report.skipped.push(format!("{} tetrahedra lie before the near plane", seen.before_near));

@@ -65,20 +65,10 @@ pub struct Shadows {
     side: u32,
     /// Pictures in a row of the image.
     columns: u32,
-    /// Texels a step of a light's ray.
-    step: f64,
     opacity_distance: f64,
     curves: Target,
     /// Where there are solids.
     blockers: Option<Target>,
-}
-
-/// Texels a step of a light's ray, where a march does not take too many such.
-pub fn finest_step(scene: &Scene) -> f64 {
-    match scene.march {
-        March::Default { step } => step.min(COARSEST_STEP),
-        March::Paper { .. } | March::Exact => COARSEST_STEP,
-    }
 }
 
 /// What draws the curves: of rays that walk, and of those that they leave.
@@ -89,7 +79,7 @@ struct CurvePipelines {
 
 impl Shadows {
     /// Draws the pictures of all lights that cast shadows, of which there is at least one. `ways` are of the scene's shell, and placed
-    /// where the device holds its tetrahedra. A ray takes steps of so many texels, `step`, or of as few as the scene's march.
+    /// where the device holds its tetrahedra.
     ///
     /// # Errors
     /// [`Error::Device`] where the pictures are too large for the device,
@@ -99,7 +89,6 @@ impl Shadows {
         scene: &Scene,
         volume: &DeviceVolume,
         ways: &Ways,
-        step: Option<f64>,
         progress: &dyn Progress,
         interrupt: &Interrupt,
     ) -> Result<Self> {
@@ -129,7 +118,6 @@ impl Shadows {
             ranges,
             side,
             columns,
-            step: step.unwrap_or_else(|| finest_step(scene)),
             opacity_distance: scene.medium.opacity_distance,
         };
         // First: rays are followed no farther.
@@ -139,16 +127,6 @@ impl Shadows {
             interrupt.check()
         })?;
         Ok(shadows)
-    }
-
-    /// Texels a step of a light's ray.
-    pub fn step(&self) -> f64 {
-        self.step
-    }
-
-    /// The next longer one, if there is any.
-    pub fn longer_step(&self) -> Option<f64> {
-        (self.step < COARSEST_STEP).then(|| (2.0 * self.step).min(COARSEST_STEP))
     }
 
     /// How many pictures there are.
@@ -233,11 +211,15 @@ impl Shadows {
         ways: &Ways,
         between: &dyn Fn(f64) -> Result<()>,
     ) -> Result<()> {
+        let step = match scene.march {
+            March::Default { step } => step.min(COARSEST_STEP),
+            March::Paper { .. } | March::Exact => COARSEST_STEP,
+        };
         let constants = ViewConstants {
             centre: [0.5 * self.side as f32; 2],
             near: NEAR,
             lod_scale: scene.medium.lod_footprint as f32,
-            step: self.step as f32,
+            step: step as f32,
             samples: 1,
             ..ViewConstants::of_volume(&scene.volume, volume.even())
         };

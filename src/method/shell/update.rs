@@ -72,7 +72,6 @@ impl Shell {
         }
         if !(same_shell && same_volume && same_solids && has_same_shadows(before, &scene)) {
             self.shadows = None;
-            self.light_step = None;
         }
         let same_topology = Arc::ptr_eq(&before.shell.topology, &scene.shell.topology);
         if !same_topology {
