@@ -9,6 +9,7 @@ layout(input_attachment_index = 0, set = 0, binding = 24) uniform subpassInput p
 layout(constant_id = 6) const float SATURATED = 0.0; // of march.glsl
 
 void main() {
+    // Of a pixel that is left to the host alpha is infinite, and stays so.
     if (!(1.0 - subpassLoad(picture).a <= SATURATED)) discard;
     gl_FragDepth = SATURATED_MARK;
 }

@@ -30,7 +30,8 @@ void main() {
 #ifdef WALKED
     const float nearness = 1.0;
 #else
-    const float nearness = 0.5; // where a depth is kept, that of pixels for which it was drawn as WALKED is nearer
+    // Where a depth is kept, that of pixels for which it was drawn as WALKED is nearer; where pixels are marked, those that are saturated.
+    const float nearness = 0.5;
 #endif
     gl_Position = vec4(right ? tile.bounds.z : tile.bounds.x, low ? tile.bounds.w : tile.bounds.y, nearness, 1.0);
 }

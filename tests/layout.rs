@@ -3,6 +3,7 @@
 use std::collections::HashMap;
 use std::mem::offset_of;
 
+use mesoshell::gpu::PICTURE;
 use mesoshell::gpu::shaders::{self, Spirv};
 use mesoshell::method::shell::ViewConstants;
 use mesoshell::method::shell::lit::{Frame, LightSource, Lighting};
@@ -174,6 +175,7 @@ fn nothing_is_compiled_in_that_a_scene_does_not_need() {
     assert_eq!(shell(&["LIT", "SHADOWS"]), [3, 5, 6, 8, 9, 10]);
     assert_eq!(shell(&["LIT", "SHADOWS", "SOLIDS"]), [3, 5, 6, 8, 9, 10, 14, 15]);
     let surface = |on: &[&str]| bindings(shaders::SURFACE_FRAG.with(on));
+    assert_eq!(bindings(shaders::SATURATED_FRAG.with(&[])), [PICTURE]);
     assert_eq!(surface(&[]), [15, 17, 23]);
     assert_eq!(surface(&["LIT", "SHADOWS"]), [5, 6, 10, 14, 15, 17, 23]);
     assert_eq!(bindings(shaders::CYCLE_FRAG.with(&[])), [0, 2, 8]);

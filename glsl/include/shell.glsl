@@ -1,5 +1,6 @@
 // What the shell shaders share with src/method/shell; tests/layout.rs compares the two from the SPIR-V.
-// Bindings: 0 to 7 are buffers, from 8 on textures, 18 to 21 and 23 rows of texels; each has one number in all shaders.
+// Bindings: 0 to 7 are buffers, from 8 on textures, 18 to 21 and 23 rows of texels, 24 the picture
+// itself; each has one number in all shaders.
 //
 // View space here: origin at the eye, x right, y up, z = depth *into* the picture. Lengths are in parts of `Seen::unit`.
 

@@ -243,14 +243,15 @@ fn explain(savings: &[Saving], report: &Report) -> String {
     let saved = |saving: &Saving| {
         let Saving { with, without, noise, difference, .. } = saving;
         let saved = without - with;
-        let noise = if saved.abs() > *noise {
-            String::new()
-        } else {
-            format!(" (no more than frames that are alike differ by, {noise:.2} ms)")
+        let certainty = match saved.abs() > *noise {
+            true => String::new(),
+            false => format!(" (no more than frames that are alike differ by, {noise:.2} ms)"),
         };
-        format!("{saved:9.2} ms{noise} of {without:.2} ms without it; the picture differs by {difference:.1e}")
+        format!(
+            "{saved:9.2} ms{certainty} of {without:.2} ms without it; the picture differs by {difference:.1e}"
+        )
     };
-    let saved = match savings {
+    let all_saved = match savings {
         [] => String::new(),
         _ => format!(
             "saved, where the eye stays where it is:\n{}\n",
@@ -260,9 +261,11 @@ fn explain(savings: &[Saving], report: &Report) -> String {
     let counts = table(report.counts.iter().map(|(name, count)| (name.as_str(), format!("{count:9}"))));
     let skipped: String = match &*report.skipped {
         [] => "left out: nothing\n".to_owned(),
-        skipped => skipped.iter().fold("left out:\n".to_owned(), |text, skipped| text + "  - " + skipped + "\n"),
+        skipped => {
+            skipped.iter().fold("left out:\n".to_owned(), |text, skipped| text + "  - " + skipped + "\n")
+        }
     };
-    format!("{skipped}{saved}counted:\n{counts}\ntook:\n")
+    format!("{skipped}{all_saved}counted:\n{counts}\ntook:\n")
 }
 
 fn skips() -> PossibleValuesParser {

@@ -102,11 +102,11 @@ impl Target {
         let name = "the picture";
         let read_by = ReadBy::Host { marked: marked != Marked::Never };
         let (format, bytes) = Self::check(gpu, name, [width, height], attachments, read_by)?;
-        let mut target = Self::empty(gpu, name, format, [width, height], [attachments, 1])?;
+        let reads_itself = marked == Marked::ByPicture;
+        let mut target = Self::empty(gpu, name, format, [width, height], [attachments, 1], reads_itself)?;
         if marked != Marked::Never {
             target.keep_depths(name, MARK_FORMAT)?;
         }
-        target.reads_itself = marked == Marked::ByPicture;
         target.readbacks =
             (0..attachments).map(|_| Buffer::readback(gpu, "the picture", bytes)).collect::<Result<_>>()?;
         target.finish()
@@ -128,7 +128,7 @@ impl Target {
         nearest: bool,
     ) -> Result<Self> {
         let (format, _) = Self::check(gpu, name, [width, height], attachments, ReadBy::Shaders { nearest })?;
-        let mut target = Self::empty(gpu, name, format, [width, height], [1, attachments])?;
+        let mut target = Self::empty(gpu, name, format, [width, height], [1, attachments], false)?;
         if nearest {
             if !gpu.supports(DEPTH_FORMAT, vk::FormatFeatureFlags::DEPTH_STENCIL_ATTACHMENT) {
                 let message = format!("{} has no depth buffer of 32 bits", gpu.info().name);
@@ -169,12 +169,13 @@ impl Target {
         format: Rgba,
         [width, height]: [u32; 2],
         [images, layers]: [usize; 2],
+        reads_itself: bool,
     ) -> Result<Self> {
         let layers = u32::try_from(layers).expect("few attachments");
         let usage = vk::ImageUsageFlags::COLOR_ATTACHMENT
             | vk::ImageUsageFlags::TRANSFER_SRC
             | vk::ImageUsageFlags::SAMPLED
-            | vk::ImageUsageFlags::INPUT_ATTACHMENT;
+            | if reads_itself { vk::ImageUsageFlags::INPUT_ATTACHMENT } else { vk::ImageUsageFlags::empty() };
         let info = image_info(format.raw(), [width, height], layers, usage);
         let view = if layers > 1 { vk::ImageViewType::TYPE_2D_ARRAY } else { vk::ImageViewType::TYPE_2D };
         let aspect = vk::ImageAspectFlags::COLOR;
@@ -186,7 +187,7 @@ impl Target {
             height,
             images,
             depth: None,
-            reads_itself: false,
+            reads_itself,
             readbacks: Vec::new(),
             sampler: vk::Sampler::null(),
             clearing: vk::RenderPass::null(),

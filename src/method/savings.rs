@@ -22,7 +22,7 @@ pub struct Saving {
     pub with: f64,
     /// The same frame with nothing but this not left out.
     pub without: f64,
-    /// How far apart, in milliseconds, frames were that are alike: less than this is not known to be a saving.
+    /// How far apart, in milliseconds, frames were that are alike, of all that was measured: less than this is not known to be a saving.
     pub noise: f64,
     /// The largest difference of a channel, linear premultiplied, between the two.
     pub difference: f64,
@@ -55,16 +55,17 @@ pub fn savings(entry: &Entry, plan: &[Choice], scene: &Scene, setup: &Setup<'_>)
         Ok::<_, Error>((frame, fastest, slowest - fastest))
     };
     setup.progress.stage("measuring what was saved");
-    let (frame, with, apart) = draw(scene.skips)?;
+    let (frame, with, mut noise) = draw(scene.skips)?;
     let mut savings = Vec::new();
     for (index, &skip) in on.iter().enumerate() {
         setup.progress.fraction((index + 1) as f64 / (on.len() + 1) as f64);
         setup.interrupt.check()?;
         let off: Vec<Skip> =
             Skip::ALL.into_iter().filter(|&other| other == skip || !scene.skips.allow(other)).collect();
-        let (other, without, other_apart) = draw(Skips::without(&off))?;
+        let (other, without, apart) = draw(Skips::without(&off))?;
+        noise = noise.max(apart);
         let difference = metric::compare(&frame.image, &other.image)?.max;
-        savings.push(Saving { skip, with, without, noise: apart.max(other_apart), difference });
+        savings.push(Saving { skip, with, without, noise: 0.0, difference });
     }
-    Ok(savings)
+    Ok(savings.into_iter().map(|saving| Saving { noise, ..saving }).collect())
 }

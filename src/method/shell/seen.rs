@@ -152,24 +152,30 @@ impl Seen {
         seen
     }
 
-    /// The runs in parts, each after such a part of all that is in [`Seen::list`].
+    /// The runs, cut where such parts of [`Seen::list`], 0 to 1, ascending, are done; cycles are not cut. No part is empty.
     pub fn parts(&self, after: &[f64]) -> Vec<Vec<Run>> {
-        let mut parts = vec![Vec::new()];
+        let mut parts = Vec::new();
+        let mut part = Vec::new();
         let mut looks = after.iter().map(|part| (part * self.list.len() as f64) as u32).peekable();
         for run in &self.runs {
             let Run::Sorted(Range { mut start, end }) = run.clone() else {
-                parts.last_mut().expect("one at least").push(run.clone());
+                part.push(run.clone());
                 continue;
             };
-            while let Some(look) = looks.next_if(|look| *look < end) {
+            while let Some(look) = looks.next_if(|look| *look <= end) {
                 if look > start {
-                    parts.last_mut().expect("one at least").push(Run::Sorted(start..look));
+                    part.push(Run::Sorted(start..look));
                     start = look;
                 }
-                parts.push(Vec::new());
+                if !part.is_empty() {
+                    parts.push(std::mem::take(&mut part));
+                }
             }
-            parts.last_mut().expect("one at least").push(Run::Sorted(start..end));
+            if start < end {
+                part.push(Run::Sorted(start..end));
+            }
         }
+        parts.extend((!part.is_empty()).then_some(part));
         parts
     }
 
@@ -387,5 +393,27 @@ impl<'a> Eye<'a> {
             (0..3).map(|i| rows[i].length_squared() * f64::from(size[i]).powi(2)).fold(0.0, f64::max).sqrt();
         let footprint = self.scene.medium.lod_footprint * self.projection.pixel * farthest;
         footprint * texels_per_unit > 1.0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn runs_are_cut_and_nothing_of_them_is_lost() {
+        let parts = |runs: &[Run], list: usize, after: &[f64]| {
+            Seen { runs: runs.to_vec(), list: vec![0; list], ..Seen::default() }.parts(after)
+        };
+        let sorted = |range| vec![Run::Sorted(range)];
+        let looks = [0.25, 0.5, 0.75];
+        assert!(parts(&[], 0, &looks).is_empty());
+        assert_eq!(parts(&sorted(0..1), 1, &looks), [sorted(0..1)]);
+        assert_eq!(parts(&sorted(0..8), 8, &looks), [sorted(0..2), sorted(2..4), sorted(4..6), sorted(6..8)]);
+        // Before a cycle, and once after it for all that fall into it.
+        let around = [Run::Sorted(0..2), Run::Cycle(0..9), Run::Sorted(7..8)];
+        assert_eq!(parts(&around, 8, &looks), [sorted(0..2), vec![Run::Cycle(0..9)], sorted(7..8)]);
+        let last = [Run::Sorted(0..3), Run::Cycle(0..9)];
+        assert_eq!(parts(&last, 8, &looks), [sorted(0..2), vec![Run::Sorted(2..3), Run::Cycle(0..9)]]);
     }
 }

@@ -215,8 +215,15 @@ fn where_seen(triangles: &[Triangle], view: &View) -> impl Iterator<Item = [f32;
         let project = |[x, y, z, _]: [f32; 4]| {
             (z > 0.0).then(|| projection.project(DVec3::new(x.into(), y.into(), z.into())))
         };
-        for square in squares.around(triangle.corners.map(project)) {
+        let corners = triangle.corners.map(project);
+        if corners.iter().all(Option::is_none) {
+            continue; // behind the eye
+        }
+        for square in squares.around(corners) {
             is_seen[square] = true;
+        }
+        if corners.iter().any(Option::is_none) {
+            break; // it may be seen anywhere
         }
     }
     let seen = is_seen.into_iter().enumerate().filter(|(_, is_seen)| *is_seen);
@@ -274,5 +281,30 @@ impl Eye {
                 .to_array(),
         };
         (seen, face)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::Camera;
+
+    #[test]
+    fn host_and_shader_agree_on_a_face() {
+        let shader = include_str!("../../../glsl/surface.frag.glsl");
+        assert!(shader.contains(&format!("int first = {} * int(triangle);", size_of::<Face>() / 16)));
+    }
+
+    #[test]
+    fn solids_are_lit_where_they_may_be_seen() {
+        let camera = Camera { eye: DVec3::ZERO, target: -DVec3::Z, up: DVec3::Y, fov_y: 1.0, near: 0.1 };
+        let view = View { camera, width: 64, height: 48, depth: false };
+        let tiles = |z: [f32; 3]| {
+            let corner = |z: f32| [0.01 * z, 0.01 * z, z, 0.0];
+            where_seen(&[Triangle { corners: z.map(corner), plane: [0.0; 4] }], &view).count()
+        };
+        assert_eq!(tiles([-1.0, -2.0, -1.0]), 0, "behind the eye");
+        assert_eq!(tiles([1.0, -2.0, 1.0]), 4 * 3, "beside it");
+        assert!((1..=4).contains(&tiles([1.0, 2.0, 1.0])));
     }
 }
