@@ -28,7 +28,6 @@ pub(super) struct Canvas {
 }
 
 /// What draws the medium, with what each way needs beside the cells.
-#[expect(clippy::large_enum_variant, reason = "there is one of it")]
 enum Medium {
     Sorted {
         pipeline: Pipeline,
