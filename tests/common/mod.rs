@@ -1,5 +1,7 @@
-//! What the tests that draw share: a watched device. Scenes without a file are in `mesoshell::stress::scenes`.
+//! What the tests that draw share: a watched device. Scenes without a file are in `mesoshell::stress::scenes`, and in `effects`.
 #![allow(dead_code, reason = "each test binary uses its own part")]
+
+pub mod effects;
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
