@@ -3,10 +3,9 @@
 // Marks pixels through which next to nothing is let: nothing more is drawn there.
 
 #include "marks.glsl"
+#include "medium.glsl"
 
 layout(input_attachment_index = 0, set = 0, binding = 24) uniform subpassInput picture;
-
-layout(constant_id = 6) const float SATURATED = 0.0; // of march.glsl
 
 void main() {
     // Of a pixel that is left to the host alpha is infinite, and stays so.

@@ -76,12 +76,12 @@ void main() {
     vec3 normal = normalize(vec3(along(face.normal[0], point), along(face.normal[1], point), along(face.normal[2], point)));
     vec3 scattered = lighting.ambient;
     vec3 mirrored = vec3(0.0);
-    // Unrolled by hand: few scenes have more.
+    // UNROLLED by hand.
     if (LIGHTS > 0) add_light(0, at, face, normal, to_eye, scattered, mirrored);
     if (LIGHTS > 1) add_light(1, at, face, normal, to_eye, scattered, mirrored);
     if (LIGHTS > 2) add_light(2, at, face, normal, to_eye, scattered, mirrored);
     if (LIGHTS > 3) add_light(3, at, face, normal, to_eye, scattered, mirrored);
-    for (uint i = 4; i < LIGHTS; i++) add_light(i, at, face, normal, to_eye, scattered, mirrored);
+    for (uint i = UNROLLED; i < LIGHTS; i++) add_light(i, at, face, normal, to_eye, scattered, mirrored);
     colour = colour * scattered + mirrored;
 #endif
     out_rgba = vec4(colour, 1.0);

@@ -10,6 +10,9 @@ layout(constant_id = 10) const uint PICTURES = 1;
 layout(constant_id = 11) const uint POINTS_LOW = 0; // those that shine from a point, not from infinitely far
 layout(constant_id = 12) const uint POINTS_HIGH = 0;
 
+// Those that are no loop, but written out: few scenes have more.
+const uint UNROLLED = 4;
+
 const uint MOST_LIGHTS = 64;
 const uint MOST_PICTURES = 6 * MOST_LIGHTS;
 

@@ -34,8 +34,6 @@ float mean_depth(float optical, float alpha) {
     return optical < 0.5 ? series : 1.0 / optical - (1.0 - alpha) / alpha;
 }
 
-layout(constant_id = 6) const float SATURATED = 0.0; // where no more is let through the rest is not looked at
-
 #if defined(WALKS) && defined(LIT)
 // Samples that are taken in a tetrahedron before the rays of other pixels, which run at once and wait, go on to their next one. Unlit
 // ones, which cost less than to ask whose turn it is, are all taken.

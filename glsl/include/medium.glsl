@@ -16,6 +16,8 @@ float opacity(float depth) {
     return depth < 0.03125 ? series : 1.0 - exp(-depth);
 }
 
+layout(constant_id = 6) const float SATURATED = 0.0; // where no more is let through the rest is not looked at
+
 // What a ray has gathered, front to back. Sums are compensated (Kahan 1965), so that the steps of a long path through a thin
 // medium, each of which would be rounded to the last bit of the sum, add up.
 struct Gathered {

@@ -16,9 +16,6 @@ struct Spot {
     float agreement;
 };
 
-// Lights that are no loop.
-const uint UNROLLED = 4;
-
 // What is the same all along a ray; lavapipe takes nothing out of loops by itself.
 vec3 world_ray; // at unit depth
 vec3 to_eye;

@@ -403,4 +403,10 @@ mod tests {
         let shader = include_str!("../../../glsl/include/curve.glsl");
         assert!(shader.contains(&format!("const uint PARTS = {PARTS};")));
     }
+
+    #[test]
+    fn host_and_shader_agree_on_the_longest_step() {
+        let shader = include_str!("../../../glsl/shadow_left.frag.glsl");
+        assert!(shader.contains(&format!("const float LONGEST_STEP = {COARSEST_STEP};")));
+    }
 }

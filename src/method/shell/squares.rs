@@ -1,5 +1,5 @@
-//! The squares that a picture is drawn in, of 64 x 64 pixels as a rule: each by the shader that suffices for what is seen in it, and a few at a time,
-//! so that no submission takes long. They are the bins of lavapipe's rasteriser; nothing in them depends on that.
+//! The squares that a picture is drawn in, of 64 x 64 pixels as a rule: each by the shader that suffices for what is seen in it, and a
+//! few at a time, so that no submission takes long. Those of 64 x 64 are the bins of lavapipe's rasteriser; nothing in them depends on that.
 
 use std::ops::Range;
 
