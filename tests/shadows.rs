@@ -309,3 +309,16 @@ fn a_short_step_is_not_too_much_for_lights() {
     assert!(difference < 8e-4, "{difference}");
     assert!(rmse(&coarse, &Image::new(24, 24)) > 0.1);
 }
+
+/// A light's picture shows all solids: one far away makes the shadows of the shell coarse, and that is told of.
+#[test]
+fn a_solid_far_away_comes_with_a_warning() {
+    let warns = |at: DVec3| {
+        let mut scene = ring();
+        scene.solids = [plate(at, 0.8, DVec3::Y)].into();
+        let warnings = render(&scene).report.warnings;
+        warnings.iter().any(|warning| warning.contains("shading.shadow_size"))
+    };
+    assert!(!warns(DVec3::new(0.9, 0.31, 0.4)));
+    assert!(warns(DVec3::new(40.0, 0.31, 0.4)));
+}

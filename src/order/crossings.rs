@@ -134,7 +134,7 @@ impl BandCrossings<'_> {
 mod tests {
     use super::*;
     use crate::mesh::generate::{Generator, Torus};
-    use crate::scene::{Light, Source};
+    use crate::scene::{Extent, Light, Source};
     use crate::shell::{EXTERIOR, ShellOptions};
 
     /// Where a ray crosses outer faces, each tried by itself.
@@ -174,10 +174,11 @@ mod tests {
             lamp(DVec3::new(0.3, 4.0, 1.7)),
             lamp(DVec3::new(0.81, 0.07, 0.62)),
         ];
+        let extent = Extent::of(shell.vertices.to_vec());
         let mut crossed = 0;
         for source in sources {
             let light = Light { source, colour: DVec3::ONE, shadow: true };
-            for view in LightView::of(&light, DVec3::ZERO, 2.0, SIDE) {
+            for view in LightView::of(&light, &extent, SIDE) {
                 let crossings = Crossings::of_light(&faces, &shell, &view, SIDE);
                 assert_eq!(crossings.of_pixels.len(), (SIDE * SIDE) as usize);
                 let pixels = (0..SIDE).flat_map(|y| (0..SIDE).map(move |x| [x, y]));

@@ -87,9 +87,9 @@ impl Shadows {
     /// `None` where no light casts shadows. Nothing in the scene is brighter, unlit, than `unlit`.
     pub fn of(scene: &Scene, eye: DVec3, unlit: f64) -> Option<Self> {
         let shading = scene.shading.as_ref()?;
-        let (centre, radius) = scene.bounds();
+        let extent = scene.extent();
         let pixel = |light: &Light| {
-            let first = || LightView::of(light, centre, radius, shading.shadow_size)[0];
+            let first = || LightView::of(light, &extent, shading.shadow_size)[0];
             light.shadow.then(|| first().pixel)
         };
         let pixels: Vec<_> = shading.lights.iter().map(pixel).collect();
@@ -108,7 +108,7 @@ impl Shadows {
                 beacons,
                 weight,
                 count,
-                extent: 2.0 * radius,
+                extent: 2.0 * extent.radius,
                 stretch: TEXELS_OF_STRETCH * u.min(v).min(w),
             }
         })

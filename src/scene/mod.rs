@@ -46,7 +46,7 @@ pub use camera::{Camera, View};
 pub use load::{Loaded, load, load_if, parse};
 pub use sequence::{FrameInputs, Sequence};
 pub use shading::{Emission, Light, Model, Shading, Source};
-pub use shadow::LightView;
+pub use shadow::{Extent, LightView};
 pub use skip::{Skip, Skips};
 pub use solid::Solid;
 pub use timeline::{Ease, Timeline};

@@ -13,7 +13,8 @@
 //!
 //! T. Lokovic, E. Veach, *Deep shadow maps*, 2000, is where such pictures of a light come from.
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
+use rayon::prelude::*;
 
 use super::camera::CameraFrame;
 use super::{Light, Scene, Source};
@@ -38,19 +39,23 @@ pub struct LightView {
 const BORDER: f64 = 2.0;
 
 impl LightView {
-    /// The pictures of a light, each of `size` times `size` pixels, that together show all of the scene: one of parallel rays, one
-    /// from a point outside, six from a point in the midst, along the axes. The scene is a sphere around it.
-    pub fn of(light: &Light, centre: DVec3, radius: f64, size: u32) -> Vec<Self> {
+    /// The pictures of a light, each of `size` times `size` pixels, that together show all of the scene: one of parallel rays, as
+    /// small a square as they see it in; one from a point outside, six from a point in the midst, along the axes, of a sphere around it.
+    pub fn of(light: &Light, extent: &Extent, size: u32) -> Vec<Self> {
+        let Extent { centre, radius, .. } = *extent;
         let size = f64::from(size);
         let widen = size / (size - 2.0 * BORDER);
         match light.source {
-            Source::Directional { towards } => vec![Self {
-                origin: centre + radius * towards,
-                frame: looking_along(-towards),
-                is_parallel: true,
-                pixel: 2.0 * radius * widen / size,
-                far: 2.0 * radius,
-            }],
+            Source::Directional { towards } => {
+                let Square { frame, middle, side } = extent.square_along(-towards);
+                vec![Self {
+                    origin: middle + radius * towards,
+                    frame,
+                    is_parallel: true,
+                    pixel: side * widen / size,
+                    far: 2.0 * radius,
+                }]
+            }
             Source::Point { position, .. } => {
                 let way = centre - position;
                 let distance = way.length();
@@ -90,32 +95,121 @@ fn looking_along(forward: DVec3) -> CameraFrame {
     CameraFrame { right: forward.cross(up), up, forward }
 }
 
-impl Scene {
-    /// A sphere around all that a light may shine on: centre and radius, in world units.
-    pub fn bounds(&self) -> (DVec3, f64) {
-        let points = || {
-            let solids = self.solids.iter().flat_map(|solid| &solid.mesh.positions);
-            self.shell.vertices.iter().chain(solids).copied()
-        };
-        let Some(first) = points().next() else { return (DVec3::ZERO, 1.0) };
-        let (low, high) = points().fold((first, first), |(low, high), p| (low.min(p), high.max(p)));
+/// All that a light may shine on.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Extent {
+    /// Of a sphere around it, in world space.
+    pub centre: DVec3,
+    /// In world units; positive.
+    pub radius: f64,
+    /// What it is spanned by.
+    points: Vec<DVec3>,
+}
+
+/// A square around all, across a direction.
+struct Square {
+    /// Its sides are along `right` and `up`.
+    frame: CameraFrame,
+    /// In the plane of the extent's centre.
+    middle: DVec3,
+    side: f64,
+}
+
+/// How many directions of a square's sides are tried, over a quarter of a turn: by two degrees it is at most 3.5 % too large.
+const TURNS: usize = 45;
+
+impl Extent {
+    /// Of all that lies between these points, in world space.
+    pub fn of(points: Vec<DVec3>) -> Self {
+        let points = if points.is_empty() { vec![DVec3::ZERO] } else { points };
+        let first = points[0];
+        let (low, high) = points.iter().fold((first, first), |(low, high), &p| (low.min(p), high.max(p)));
         let centre = 0.5 * (low + high);
-        let radius = points().map(|p| p.distance(centre)).fold(0.0, f64::max);
-        (centre, if radius > 0.0 { radius } else { 1.0 })
+        let radius = points.iter().map(|p| p.distance(centre)).fold(0.0, f64::max);
+        Self { centre, radius: if radius > 0.0 { radius } else { 1.0 }, points }
+    }
+
+    /// The smallest square, of those that are tried, in which all is seen along a unit vector.
+    fn square_along(&self, forward: DVec3) -> Square {
+        let CameraFrame { right, up, .. } = looking_along(forward);
+        let seen = |point: &DVec3| {
+            let way = *point - self.centre;
+            DVec2::new(way.dot(right), way.dot(up))
+        };
+        let seen: Vec<DVec2> = self.points.par_iter().map(seen).collect();
+        // From where to where it reaches along each direction of half a turn.
+        let reach = |turn: usize| {
+            let axis = DVec2::from_angle(std::f64::consts::FRAC_PI_2 * turn as f64 / TURNS as f64);
+            let places = seen.iter().map(|point| point.dot(axis));
+            let [low, high] = places.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], place| {
+                [low.min(place), high.max(place)]
+            });
+            (axis, low, high)
+        };
+        let reaches: Vec<(DVec2, f64, f64)> = (0..2 * TURNS).into_par_iter().map(reach).collect();
+        let length = |(_, low, high): (DVec2, f64, f64)| high - low;
+        let side = |turn: usize| length(reaches[turn]).max(length(reaches[turn + TURNS]));
+        let turn = (0..TURNS).min_by(|&a, &b| side(a).total_cmp(&side(b))).expect("there are some");
+        let along = |axis: DVec2| axis.x * right + axis.y * up;
+        let [across, upwards] = [turn, turn + TURNS].map(|turn| reaches[turn]);
+        let middle = |(axis, low, high): (DVec2, f64, f64)| 0.5 * (low + high) * along(axis);
+        Square {
+            frame: CameraFrame { right: along(across.0), up: along(upwards.0), forward },
+            middle: self.centre + middle(across) + middle(upwards),
+            side: if side(turn) > 0.0 { side(turn) } else { 2.0 * self.radius },
+        }
+    }
+}
+
+impl Scene {
+    /// All that a light may shine on.
+    pub fn extent(&self) -> Extent {
+        let solids = self.solids.iter().flat_map(|solid| &solid.mesh.positions);
+        Extent::of(self.shell.vertices.iter().chain(solids).copied().collect())
+    }
+
+    /// By how much pixels of a light's picture are wider, since it shows the solids, too, than for the shell alone.
+    pub fn coarsened_by_solids(&self, light: &Light, size: u32) -> f64 {
+        let pixel = |extent: &Extent| LightView::of(light, extent, size)[0].pixel;
+        pixel(&self.extent()) / pixel(&Extent::of(self.shell.vertices.to_vec()))
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use glam::DQuat;
+
     use super::*;
 
-    fn views(source: Source) -> Vec<LightView> {
-        let light = Light { source, colour: DVec3::ONE, shadow: true };
-        LightView::of(&light, DVec3::new(1.0, 2.0, 3.0), 2.0, 100)
+    const CENTRE: DVec3 = DVec3::new(1.0, 2.0, 3.0);
+
+    /// A spiral over a sphere.
+    fn sphere() -> Extent {
+        let point = |i: u32| {
+            let height = 1.0 - f64::from(i) / 249.5;
+            let (sine, cosine) = (2.4 * f64::from(i)).sin_cos();
+            let around = DVec3::new(cosine, sine, 0.0) * (1.0 - height * height).max(0.0).sqrt();
+            CENTRE + 2.0 * (around + height * DVec3::Z)
+        };
+        Extent::of((0..500).map(point).collect())
+    }
+
+    /// The corners of a box around `CENTRE`, turned about z.
+    fn turned_box(half: DVec3, degrees: f64) -> Extent {
+        let turn = DQuat::from_rotation_z(degrees.to_radians());
+        let corner = |i: u32| {
+            CENTRE + turn * (half * DVec3::from([0, 1, 2].map(|k| f64::from(i >> k & 1) * 2.0 - 1.0)))
+        };
+        Extent::of((0..8).map(corner).collect())
+    }
+
+    fn views(source: Source, extent: &Extent) -> Vec<LightView> {
+        LightView::of(&Light { source, colour: DVec3::ONE, shadow: true }, extent, 100)
     }
 
     #[test]
     fn a_light_outside_takes_one_picture_and_one_within_six() {
+        let views = |source| views(source, &sphere());
         assert_eq!(views(Source::Directional { towards: DVec3::Y }).len(), 1);
         let from = |position| views(Source::Point { position, falloff: None });
         assert_eq!(from(DVec3::new(1.0, 2.0, 9.0)).len(), 1);
@@ -130,14 +224,12 @@ mod tests {
             Source::Point { position: DVec3::new(4.0, 4.0, 4.0), falloff: None },
             Source::Point { position: DVec3::new(1.5, 2.0, 3.0), falloff: None },
         ];
-        for source in sources {
-            let views = views(source);
-            for i in 0..500 {
-                // A spiral over the sphere.
-                let height = 1.0 - f64::from(i) / 249.5;
-                let (sine, cosine) = (2.4 * f64::from(i)).sin_cos();
-                let around = DVec3::new(cosine, sine, 0.0) * (1.0 - height * height).max(0.0).sqrt();
-                let point = DVec3::new(1.0, 2.0, 3.0) + 2.0 * (around + height * DVec3::Z);
+        let boxes = [0.0, 17.0, 45.0, 80.0].map(|degrees| turned_box(DVec3::new(1.5, 0.4, 0.1), degrees));
+        for (source, extent) in sources.iter().flat_map(|&source| {
+            [sphere()].into_iter().chain(boxes.clone()).map(move |extent| (source, extent))
+        }) {
+            let views = views(source, &extent);
+            for &point in &extent.points {
                 let is_seen = |view: &LightView| {
                     let way = point - view.origin;
                     let depth = way.dot(view.frame.forward);
@@ -148,5 +240,24 @@ mod tests {
                 assert!(views.iter().any(is_seen), "{point} from {source:?}");
             }
         }
+    }
+
+    #[test]
+    fn a_picture_of_parallel_rays_is_as_small_a_square_as_what_it_shows() {
+        let along_z = Source::Directional { towards: DVec3::Z };
+        for degrees in [0.0, 17.0, 45.0, 80.0] {
+            let square = turned_box(DVec3::new(1.0, 1.0, 0.3), degrees);
+            let side = views(along_z, &square)[0].pixel * 96.0;
+            // By one degree, half of what two directions are apart, it is larger by the sine.
+            assert!((2.0 - 1e-12..=2.0 * (1.0 + 0.0175)).contains(&side), "{side} at {degrees}");
+            // Of a rod the sides are along its diagonals.
+            let rod = turned_box(DVec3::new(1.0, 0.0, 0.0), degrees);
+            let side = views(along_z, &rod)[0].pixel * 96.0;
+            let least = 2.0 * 0.5_f64.sqrt();
+            assert!((least - 1e-12..=least * (1.0 + 0.0175)).contains(&side), "{side} at {degrees}");
+        }
+        // A point has no extent: the picture has.
+        assert!(views(along_z, &Extent::of(vec![CENTRE]))[0].pixel > 0.0);
+        assert!(views(along_z, &Extent::of(Vec::new()))[0].pixel > 0.0);
     }
 }

@@ -134,8 +134,7 @@ fn a_light_reads_the_level_of_detail_of_its_own_pixels() {
         scene.medium.lod_footprint = footprint;
         let lamp = light(source, DVec3::ONE);
         scene.shading = Some(lit(&scene, vec![lamp]));
-        let (centre, radius) = scene.bounds();
-        let pictures = LightView::of(&lamp, centre, radius, 64);
+        let pictures = LightView::of(&lamp, &scene.extent(), 64);
         assert_eq!(pictures.len(), views);
         let light_pixel = pictures[0].pixel;
         let rho = |direction: DVec3| {

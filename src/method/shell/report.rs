@@ -4,10 +4,14 @@ use super::canvas::Canvas;
 use super::constants::{MOST_SAMPLES, wanted_samples};
 use super::plan::where_rays_end;
 use super::seen::Seen;
+use super::shadows::Shadows;
 use super::{Shell, Sight};
 use crate::frame::Report;
 use crate::scene::Skip;
 use crate::shell::Limit;
+
+/// Shadows that are so much coarser for the solids are told of.
+const COARSE: f64 = 4.0;
 
 impl Shell {
     /// Without stages, and without what was kept of the frame before.
@@ -102,6 +106,14 @@ impl Shell {
                     Some(_) => "no thickness helps there: normals lie below their triangles, which only another mesh mends",
                     None => "make it thinner, smooth its directions, or let it give way by shell.limit = \"safe\"",
                 }
+            ));
+        }
+        if let Some(coarsened) = self.shadows.as_ref().map(Shadows::coarsened_by_solids)
+            && coarsened > COARSE
+        {
+            report.warnings.push(format!(
+                "shadows are {coarsened:.0} times as coarse as the shell alone would have them, since a light's picture shows all \
+                 solids: move those that are far away nearer, or make shading.shadow_size larger"
             ));
         }
         let wanted = wanted_samples(self.scene.march, self.texels);

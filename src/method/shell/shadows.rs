@@ -69,6 +69,8 @@ pub struct Shadows {
     curves: Target,
     /// Where there are solids.
     blockers: Option<Target>,
+    /// By how much pixels are wider, at most, than if there were none.
+    coarsened_by_solids: f64,
 }
 
 /// What draws the curves: of rays that walk, and of those that they leave.
@@ -93,13 +95,18 @@ impl Shadows {
         interrupt: &Interrupt,
     ) -> Result<Self> {
         let shading = scene.shading.as_ref().expect("a light casts shadows");
-        let (centre, radius) = scene.bounds();
+        let extent = scene.extent();
         let mut views = Vec::new();
         let mut ranges = Vec::new();
+        let mut coarsened_by_solids: f64 = 1.0;
         for light in shading.lights.iter().filter(|light| light.shadow) {
             let first = views.len();
-            views.extend(LightView::of(light, centre, radius, shading.shadow_size));
+            views.extend(LightView::of(light, &extent, shading.shadow_size));
             ranges.push(first..views.len());
+            if !scene.solids.is_empty() {
+                let coarsened = scene.coarsened_by_solids(light, shading.shadow_size);
+                coarsened_by_solids = coarsened_by_solids.max(coarsened);
+            }
         }
         let side = shading.shadow_size;
         let columns = (1..).find(|columns| columns * columns >= views.len() as u32).expect("few pictures");
@@ -119,6 +126,7 @@ impl Shadows {
             side,
             columns,
             opacity_distance: scene.medium.opacity_distance,
+            coarsened_by_solids,
         };
         // First: rays are followed no farther.
         shadows.draw_blockers(gpu, scene, interrupt)?;
@@ -143,6 +151,11 @@ impl Shadows {
     pub fn widest_pixel(&self) -> f64 {
         let width = |view: &LightView| if view.is_parallel { view.pixel } else { view.pixel * view.far };
         self.views.iter().map(width).fold(0.0, f64::max)
+    }
+
+    /// By how much pixels are wider, at most, than if there were no solids.
+    pub fn coarsened_by_solids(&self) -> f64 {
+        self.coarsened_by_solids
     }
 
     /// By the binding that shaders name.
