@@ -61,17 +61,23 @@ void main() {
             if (passes > MOST_PASSES) break;
             float step = (next - z) / float(samples); // in a gap there are no samples
             for (uint i = 0; i < samples; i++) {
-                float at = z + (float(i) + 0.5) * step;
+                float begin = z + float(i) * step;
                 Sum sum = nothing();
                 for (uint hit = first; hit < end; hit++) {
                     if (spans[hit].y <= z) continue;
+                    Path path = path_in(cells[hits[hit]].texture, ray);
+                    vec4 texel = fetch(path, begin + 0.5 * step);
 #ifdef LIT
                     enter(hits[hit], ray);
+                    float optical = extinction(texel) * max(step * per_depth, LEAST);
+                    float lit_at = depth_of_step(begin, step, optical, opacity(optical));
+                    texel = lit(texel, fetch_from(directions, path, lit_at), lit_at);
 #endif
-                    add(sum, radiant(path_in(cells[hits[hit]].texture, ray), at), step * per_depth);
+                    add(sum, texel, step * per_depth);
                 }
                 vec4 mixed = mixture(sum);
 #ifdef DEPTH
+                float at = depth_of_step(begin, step, optical_of(sum), mixed.a);
                 mean_distance += transmittance(gathered) * mixed.a * at * length(ray);
 #endif
                 lay_behind(gathered, mixed);

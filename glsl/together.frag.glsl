@@ -187,17 +187,22 @@ void main() {
             // What one walker adds to a step, or all that was even.
             uint cell = places[walker] >> 2;
             float size = (stop - begin) / float(max(steps, 1u));
-            float z = begin + (float(step_index) + 0.5) * size;
+            float step_begin = begin + float(step_index) * size;
             Path path = path_of(cell, ray);
-            vec4 texel = fetch(path, z);
+            vec4 texel = fetch(path, step_begin + 0.5 * size);
+            // As much of it as this walker passes.
+            float optical = extinction(texel) * max(size * per_depth, LEAST);
             bool is_even = even_waits();
 #ifdef EVEN
-            float optical = extinction(view.even) * max(float(even_walkers) * (even.end - even.begin) * per_depth, LEAST);
             if (is_even) {
                 texel = view.even;
-                z = even.begin + (even.end - even.begin) * mean_depth(optical, opacity(optical));
+                step_begin = even.begin;
+                size = even.end - even.begin;
+                optical = extinction(texel) * max(float(even_walkers) * size * per_depth, LEAST);
             }
 #endif
+            float alpha = opacity(optical);
+            float z = depth_of_step(step_begin, size, optical, alpha);
 #ifdef LIT
             enter(cell, ray);
             texel = lit(texel, is_even ? vec4(0.0) : fetch_from(directions, path, z), z);
@@ -205,7 +210,6 @@ void main() {
             vec4 mixed = vec4(0.0);
 #ifdef EVEN
             if (is_even) {
-                float alpha = opacity(optical);
                 mixed = vec4(emitted(texel, alpha), alpha);
                 even.steps = 0;
             }
@@ -215,6 +219,7 @@ void main() {
                 walker++;
                 if (walker == walkers) {
                     mixed = mixture(sum);
+                    z = depth_of_step(step_begin, size, optical_of(sum), mixed.a);
                     sum = nothing();
                     walker = 0;
                     step_index++;

@@ -23,6 +23,11 @@ void add(inout Sum sum, vec4 texel, float path) {
     }
 }
 
+// Of a wall it is without bound.
+float optical_of(Sum sum) {
+    return sum.walls > 0 ? 3.0e38 : sum.depth;
+}
+
 // Premultiplied.
 vec4 mixture(Sum sum) {
     float alpha = sum.walls > 0 ? 1.0 : opacity(sum.depth);

@@ -34,6 +34,12 @@ float mean_depth(float optical, float alpha) {
     return optical < 0.5 ? series : 1.0 / optical - (1.0 - alpha) / alpha;
 }
 
+// The depth at which a step is lit, and which it counts as: the mean of where what it sends out comes from. Of a dense one that is near
+// its beginning, not in its middle, where it would be in its own shadow. The paper's plan takes the middle.
+float depth_of_step(float begin, float size, float optical, float alpha) {
+    return begin + size * (PLAN == PLAN_PAPER ? 0.5 : mean_depth(optical, alpha));
+}
+
 #if defined(WALKS) && defined(LIT)
 // Samples that are taken in a tetrahedron before the rays of other pixels, which run at once and wait, go on to their next one. Unlit
 // ones, which cost less than to ask whose turn it is, are all taken.
@@ -52,16 +58,13 @@ void march_midpoints(Path path, Steps steps, inout uint i, float per_depth, inou
     // 22.3 gets wrong: what a pixel that is done has summed is summed again, in part, as the others go on. So it has another at the top.
     for (; i < steps.count || even_waits();) {
         Part part = next_part(steps, i);
-        float z = part.middle;
-        vec4 texel = fetch(path, z);
+        vec4 texel = fetch(path, part.middle);
 #ifdef EVEN
         if (part.is_even) texel = view.even;
 #endif
         float optical = extinction(texel) * max(part.size * per_depth, LEAST);
         float alpha = opacity(optical);
-#ifdef EVEN
-        if (part.is_even) z = part.begin + part.size * mean_depth(optical, alpha);
-#endif
+        float z = depth_of_step(part.begin, part.size, optical, alpha);
 #ifdef LIT
         texel = lit(texel, part.is_even ? vec4(0.0) : fetch_from(directions, path, z), z);
 #endif
