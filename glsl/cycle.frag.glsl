@@ -69,7 +69,8 @@ void main() {
                     vec4 texel = fetch(path, begin + 0.5 * step);
 #ifdef LIT
                     enter(hits[hit], ray);
-                    float optical = extinction(texel) * max(step * per_depth, LEAST);
+                    // As if it were alone.
+                    float optical = optical_of(texel, step * per_depth);
                     float lit_at = depth_of_step(begin, step, optical, opacity(optical));
                     texel = lit(texel, fetch_from(directions, path, lit_at), lit_at);
 #endif

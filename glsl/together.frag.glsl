@@ -190,15 +190,15 @@ void main() {
             float step_begin = begin + float(step_index) * size;
             Path path = path_of(cell, ray);
             vec4 texel = fetch(path, step_begin + 0.5 * size);
-            // As much of it as this walker passes.
-            float optical = extinction(texel) * max(size * per_depth, LEAST);
+            // Of what this walker passes, which is lit as if it were alone.
+            float optical = optical_of(texel, size * per_depth);
             bool is_even = even_waits();
 #ifdef EVEN
             if (is_even) {
                 texel = view.even;
                 step_begin = even.begin;
                 size = even.end - even.begin;
-                optical = extinction(texel) * max(float(even_walkers) * size * per_depth, LEAST);
+                optical = optical_of(texel, float(even_walkers) * size * per_depth);
             }
 #endif
             float alpha = opacity(optical);

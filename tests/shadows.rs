@@ -303,7 +303,7 @@ fn a_short_step_is_not_too_much_for_lights() {
         let scene = Scene { march: March::Default { step }, ..scene.clone() };
         render(&scene).image
     });
-    // An eye's ray sees light that falls by exp(-2 / 64) a texel: the midpoint rule errs by a 24th of that squared, 4e-5 of a light of
+    // An eye's ray sees light that falls by exp(-2 / 64) a texel: one value for a step errs by a 24th of that squared, 4e-5 of a light of
     // at most 1. A curve has 14 knots at least, 1/13 apart, whose chords are off by up to (1/13)^2 / 8: they lie elsewhere.
     let difference = rmse(&coarse, &fine);
     assert!(difference < 8e-4, "{difference}");

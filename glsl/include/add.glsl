@@ -17,7 +17,7 @@ void add(inout Sum sum, vec4 texel, float path) {
         sum.walls++;
         sum.wall += texel.rgb;
     } else if (texel.a > LEAST) {
-        float depth = extinction(texel) * max(path, LEAST);
+        float depth = optical_of(texel, path);
         sum.depth += depth;
         sum.emission += emitted(texel, depth);
     }

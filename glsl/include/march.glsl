@@ -22,6 +22,12 @@ const uint PASSES_A_SAMPLE = LIGHTS > UNROLLED ? 1 + LIGHTS - UNROLLED : 1;
 const uint PASSES_A_SAMPLE = 1;
 #endif
 
+// Optical depth of a path through this texel. A wall stops the ray however short the path: `LEAST` keeps infinity times nothing from
+// being no number.
+float optical_of(vec4 texel, float path) {
+    return extinction(texel) * max(path, LEAST);
+}
+
 // Straight colour times `amount` of opacity, of a texel whose colour is premultiplied by its own alpha or extinction.
 vec3 emitted(vec4 texel, float amount) {
     return texel.a > LEAST ? texel.rgb * (amount / texel.a) : vec3(0.0);
@@ -48,7 +54,7 @@ const uint AT_A_TIME = 2;
 #endif
 
 // Midpoint rule over the steps from number `i` on, which becomes that of the next: the texture is constant over a step, and the
-// exponential is exact. What is even is one step, however long. Where `FEW_AT_A_TIME`, it stops after so many, or where nothing more is
+// exponential is exact. Light and directions are those of `depth_of_step`. What is even is one step, however long. Where `FEW_AT_A_TIME`, it stops after so many, or where nothing more is
 // seen; where `WALKS`, what is even at the end is left to wait. Counts passes through loops.
 void march_midpoints(Path path, Steps steps, inout uint i, float per_depth, inout Light light, inout uint passes) {
 #ifdef FEW_AT_A_TIME
@@ -62,7 +68,7 @@ void march_midpoints(Path path, Steps steps, inout uint i, float per_depth, inou
 #ifdef EVEN
         if (part.is_even) texel = view.even;
 #endif
-        float optical = extinction(texel) * max(part.size * per_depth, LEAST);
+        float optical = optical_of(texel, part.size * per_depth);
         float alpha = opacity(optical);
         float z = depth_of_step(part.begin, part.size, optical, alpha);
 #ifdef LIT

@@ -48,8 +48,8 @@ pub struct Arguments {
     /// Set a key of the scene: -D shell.thickness=0.2; may be given more than once
     #[arg(short = 'D', value_name = "KEY=VALUE")]
     define: Vec<String>,
-    /// Do not leave this out, although it could be; may be given more than once, and replaces the scene's march.no_skip
-    #[arg(long, value_name = "NAME", value_parser = skips())]
+    /// Do not leave this out, although it could be; may be several, as A,B or given more than once, and replaces the scene's march.no_skip
+    #[arg(long, value_name = "NAME", value_parser = skips(), value_delimiter = ',')]
     no_skip: Vec<String>,
     /// Tell which way is chosen for the scene and what is left out, and why; and then what came of it, and what each saves, for which
     /// the picture is drawn up to twenty times more

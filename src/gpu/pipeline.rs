@@ -83,8 +83,9 @@ pub struct Pipeline {
     /// Of the targets that it draws into.
     format: Rgba,
     attachments: usize,
-    /// Whether they have depths, and read themselves.
+    /// Whether these have depths.
     has_depths: bool,
+    /// Whether these read themselves, for any of the pipelines that draw into them.
     reads_itself: bool,
     gpu: Arc<Gpu>,
     // One thread at a time binds and draws.
@@ -111,9 +112,9 @@ impl Pipeline {
             Keeps::Blend | Keeps::Last => None,
         };
         let has_depths = target.depth.is_some();
-        let reads_itself = info.keeps == Keeps::MarksByPicture;
+        let reads_picture = info.keeps == Keeps::MarksByPicture;
         assert!(depths.is_none() || has_depths, "a target for the other kind of pipeline");
-        assert!(!reads_itself || target.reads_itself, "a target that is not marked by what was drawn");
+        assert!(!reads_picture || target.reads_itself, "a target that is not marked by what was drawn");
         assert!((4..=128).contains(&info.push_constant_bytes) && info.push_constant_bytes.is_multiple_of(4));
         // From here on `Drop` cleans up, null handles included.
         let mut pipeline = Self {
@@ -126,7 +127,7 @@ impl Pipeline {
             uniform_buffers: info.uniform_buffers.to_vec(),
             texel_buffers: info.texel_buffers.to_vec(),
             textures: info.textures.to_vec(),
-            input_attachments: if info.keeps == Keeps::MarksByPicture { vec![PICTURE] } else { Vec::new() },
+            input_attachments: if reads_picture { vec![PICTURE] } else { Vec::new() },
             minified: info.minified,
             push_constant_bytes: info.push_constant_bytes,
             format: target.format,

@@ -71,7 +71,7 @@ pub struct Shadows {
     /// How many lights cast shadows.
     count: usize,
     /// In world units: no straight line in the scene is longer.
-    extent: f64,
+    diameter: f64,
     /// In world units: what is interpolated in one go.
     stretch: f64,
 }
@@ -108,7 +108,7 @@ impl Shadows {
                 beacons,
                 weight,
                 count,
-                extent: 2.0 * extent.radius,
+                diameter: 2.0 * extent.radius,
                 stretch: TEXELS_OF_STRETCH * u.min(v).min(w),
             }
         })
@@ -156,7 +156,7 @@ impl Shadows {
         let detail_per_texel = reference.lod_footprint * pixel;
         let ray = Ray { eye, start: point, direction, width, detail_per_texel };
         let mut depth =
-            OpticalDepth { scene, ray, allowed, most: -allowed.ln(), extent: self.extent, sum: 0.0 };
+            OpticalDepth { scene, ray, allowed, most: -allowed.ln(), diameter: self.diameter, sum: 0.0 };
         reference.crossings.visit(&path, |crossing| {
             depth.add(crossing.tetrahedron, crossing.enter, crossing.exit);
             depth.is_open()
@@ -189,7 +189,7 @@ impl<'a> ShadowsOnRay<'a> {
             edges: Vec::new(),
             paths: 0,
         };
-        let Some(Shadows { pixels, beacons, extent, stretch, .. }) = &reference.shadows else {
+        let Some(Shadows { pixels, beacons, diameter, stretch, .. }) = &reference.shadows else {
             return shadows;
         };
         let start = crossings.first().map_or(0.0, |first| first.enter);
@@ -197,7 +197,7 @@ impl<'a> ShadowsOnRay<'a> {
         for (pixel, &beacon) in pixels.iter().zip(beacons) {
             let is_asked_for = pixel.is_some() && start < end;
             let umbra =
-                is_asked_for.then(|| reference.solids.umbra(direction, beacon, [start, end], *extent));
+                is_asked_for.then(|| reference.solids.umbra(direction, beacon, [start, end], *diameter));
             shadows.umbrae.push(umbra.unwrap_or(Umbra::Unknown));
             shadows.penumbrae.push(Penumbra::new(start, end, stretch / direction.length()));
         }
@@ -261,7 +261,7 @@ struct OpticalDepth<'a> {
     allowed: f64,
     /// Where depth is more, nothing passes.
     most: f64,
-    extent: f64,
+    diameter: f64,
     sum: f64,
 }
 
@@ -326,7 +326,7 @@ impl OpticalDepth<'_> {
         };
         let depth = sum(&SHORT_WEIGHTS);
         let error = scale * (depth - sum(&SHORT_COARSE_WEIGHTS)).abs();
-        let limit = 0.5 * self.allowed * (length / self.extent + SHARE_OF_EACH);
+        let limit = 0.5 * self.allowed * (length / self.diameter + SHARE_OF_EACH);
         if width > NARROWEST && error > limit && error * (-self.sum).exp() > limit {
             let middle = low + 0.5 * width;
             self.panels(layer, piece, low, middle);

@@ -125,9 +125,9 @@ pub(super) struct CanvasKind {
     depth: bool,
     /// Whether anything is resolved pixel by pixel.
     cycles: bool,
-    walks: bool,
-    /// Whether pixels are looked for in which no more is seen of what is sorted.
-    looks: bool,
+    /// By what pixels are marked: where rays walk by what these meet; where tetrahedra are sorted by what was drawn, if pixels are looked for
+    /// in which no more is seen.
+    marked: Marked,
     /// Whether there are squares in which all is magnified, and others.
     partly_magnified: bool,
     /// What is compiled into the shaders: what the scene has, and what is asked for.
@@ -206,8 +206,11 @@ impl Shell {
                 Sight::Sorted(_) => !seen.tiles.is_empty(),
                 Sight::Walked(crossings) => crossings.overlapping > 0,
             },
-            walks: matches!(sight, Sight::Walked(_)),
-            looks: matches!(sight, Sight::Sorted(_)) && self.ends_where_saturated(),
+            marked: match sight {
+                Sight::Walked(_) => Marked::Apart,
+                Sight::Sorted(_) if self.ends_where_saturated() => Marked::ByPicture,
+                Sight::Sorted(_) => Marked::Never,
+            },
             partly_magnified: match sight {
                 Sight::Walked(crossings) if skips.allow(Skip::Levels) => {
                     seen.is_worth_parting(crossings, view)
@@ -225,16 +228,13 @@ impl Shell {
 
     fn new_canvas(&self, kind: CanvasKind, sight: &Sight, seen: &Seen, view: &View) -> Result<Canvas> {
         let attachments = if kind.depth { 2 } else { 1 };
-        let marked = match (kind.walks, kind.looks) {
-            (true, _) => Marked::Apart,
-            (false, true) => Marked::ByPicture,
-            (false, false) => Marked::Never,
-        };
-        let target = Target::new(&self.gpu, [kind.width, kind.height], attachments, marked)?;
+        let target = Target::new(&self.gpu, [kind.width, kind.height], attachments, kind.marked)?;
+        let walks = matches!(sight, Sight::Walked(_));
+        let looks = kind.marked == Marked::ByPicture;
         let on = &kind.switches;
         let mut uniform_buffers = Vec::new();
-        let buffers = if kind.walks { Vec::new() } else { vec![0, 1, 2] };
-        let mut texel_buffers = if kind.walks { vec![18, 19, 20, 21] } else { Vec::new() };
+        let buffers = if walks { Vec::new() } else { vec![0, 1, 2] };
+        let mut texel_buffers = if walks { vec![18, 19, 20, 21] } else { Vec::new() };
         let mut textures = vec![8];
         for &switch in on {
             let (more_uniform_buffers, more_texel_buffers, more_textures): (&[u32], &[u32], &[u32]) =
@@ -266,7 +266,7 @@ impl Shell {
         };
         let (cells, medium) = match sight {
             Sight::Sorted(_) => {
-                let keeps = if kind.looks { Keeps::BlendAbove } else { Keeps::Blend };
+                let keeps = if looks { Keeps::BlendAbove } else { Keeps::Blend };
                 let info = PipelineInfo { keeps, ..info };
                 let of_cycles = PipelineInfo {
                     vertex: shaders::TILE_VERT.with(on),
@@ -284,7 +284,7 @@ impl Shell {
                     keeps: Keeps::MarksByPicture,
                     ..info
                 };
-                let saturated = kind.looks.then(|| Pipeline::new(&self.gpu, &target, &saturated));
+                let saturated = looks.then(|| Pipeline::new(&self.gpu, &target, &saturated));
                 let medium = Medium::Sorted {
                     pipeline: Pipeline::new(&self.gpu, &target, &info)?,
                     cycle: cycle.transpose()?,

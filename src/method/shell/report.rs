@@ -113,7 +113,7 @@ impl Shell {
         {
             report.warnings.push(format!(
                 "shadows are {coarsened:.0} times as coarse as the shell alone would have them, since a light's picture shows all \
-                 solids: move those that are far away nearer, or make shading.shadow_size larger"
+                 solids: make them smaller or move them nearer, or make shading.shadow_size larger"
             ));
         }
         let wanted = wanted_samples(self.scene.march, self.texels);

@@ -19,7 +19,7 @@ use crate::gpu::{Batch, Buffer, Draw, Gpu, Keeps, Pipeline, PipelineInfo, Sample
 use crate::order::Crossings;
 use crate::progress::{Interrupt, Progress};
 use crate::scene::shading::MOST_LIGHTS;
-use crate::scene::{LightView, March, Scene, Skip};
+use crate::scene::{Extent, LightView, March, Scene, Skip};
 use crate::{Error, Result};
 
 /// `LightPicture` of `glsl/include/picture.glsl`: see there for each member.
@@ -98,14 +98,15 @@ impl Shadows {
         let extent = scene.extent();
         let mut views = Vec::new();
         let mut ranges = Vec::new();
+        let of_shell = (!scene.solids.is_empty()).then(|| Extent::of(scene.shell.vertices.to_vec()));
         let mut coarsened_by_solids: f64 = 1.0;
         for light in shading.lights.iter().filter(|light| light.shadow) {
             let first = views.len();
             views.extend(LightView::of(light, &extent, shading.shadow_size));
             ranges.push(first..views.len());
-            if !scene.solids.is_empty() {
-                let coarsened = scene.coarsened_by_solids(light, shading.shadow_size);
-                coarsened_by_solids = coarsened_by_solids.max(coarsened);
+            if let Some(of_shell) = &of_shell {
+                let alone = LightView::of(light, of_shell, shading.shadow_size)[0].pixel;
+                coarsened_by_solids = coarsened_by_solids.max(views[first].pixel / alone);
             }
         }
         let side = shading.shadow_size;
