@@ -54,8 +54,9 @@ const uint AT_A_TIME = 2;
 #endif
 
 // Midpoint rule over the steps from number `i` on, which becomes that of the next: the texture is constant over a step, and the
-// exponential is exact. Light and directions are those of `depth_of_step`. What is even is one step, however long. Where `FEW_AT_A_TIME`, it stops after so many, or where nothing more is
-// seen; where `WALKS`, what is even at the end is left to wait. Counts passes through loops.
+// exponential is exact. Light and directions are those of `depth_of_step`. What is even is one step, however long. Where
+// `FEW_AT_A_TIME`, it stops after so many, or where nothing more is seen; where `WALKS`, what is even at the end is left to wait.
+// Counts passes through loops.
 void march_midpoints(Path path, Steps steps, inout uint i, float per_depth, inout Light light, inout uint passes) {
 #ifdef FEW_AT_A_TIME
     uint taken = 0;
@@ -179,7 +180,7 @@ void march_exactly(Path path, vec2 segment, float per_depth, inout Light light) 
     }
 }
 
-// A wall stops the ray however short the step: `LEAST` keeps infinity times nothing from being no number.
+// By the scene's plan. `LEAST` as in `optical_of`.
 void march(Path path, vec2 segment, float per_depth, inout Light light) {
     if (PLAN == PLAN_EXACT) {
         march_exactly(path, segment, max(per_depth, LEAST), light);
