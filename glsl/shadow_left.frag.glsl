@@ -14,9 +14,8 @@
 #include "light_ray.glsl"
 #include "dimming.glsl"
 
-layout(early_fragment_tests) in; // by depth: else all pixels would be gone through
-
 layout(location = 1) flat in uint picture;
+layout(location = 2) flat in uint coarsely;
 
 const float LONGEST_STEP = 0.5; // `COARSEST_STEP` of src/method/shell/shadows.rs
 
@@ -88,12 +87,17 @@ void main() {
     LightRay ray = ray_of(light_pictures[picture]);
     farthest = ray.farthest;
     uint need;
-    // Where steps are too many, longer ones are taken, but none longer than the shadows of a march of long steps have.
-    if (view.step < LONGEST_STEP && follow(ray.origin, ray.along, false, need)) {
+    // Where steps are too many, longer ones are taken, but none longer than the shadows of a march of long steps have. To count them
+    // takes passes, too: rays for which that is too much are gone through once more, coarsely.
+    if (coarsely != 0) {
+        longer = LONGEST_STEP / view.step;
+    } else if (follow(ray.origin, ray.along, false, need)) {
         // All but the steps will be gone through again; and in each stretch, which has taken as much as three steps, one more for rounding.
         uint others = min(passes + passes + passes / 3, MOST_PASSES - 1);
         longer = clamp(float(need) / float(MOST_PASSES - others), 1.0, LONGEST_STEP / view.step);
     }
-    if (follow(ray.origin, ray.along, true, need)) write_curve();
+    bool is_resolved = follow(ray.origin, ray.along, true, need);
+    if (!is_resolved && coarsely == 0) discard;
+    if (is_resolved) write_curve();
     else leave_unresolved();
 }

@@ -12,6 +12,9 @@ layout(location = 0) flat out uvec2 members; // range of what is seen there: fir
 #endif
 #ifdef LIGHT
 layout(location = 1) flat out uint picture;
+#ifndef WALKED
+layout(location = 2) flat out uint coarsely;
+#endif
 #endif
 
 const uint CORNERS[6] = uint[](0, 1, 2, 0, 2, 3);
@@ -23,6 +26,9 @@ void main() {
 #endif
 #ifdef LIGHT
     picture = tile.picture;
+#ifndef WALKED
+    coarsely = tile.coarsely;
+#endif
 #endif
     uint corner = CORNERS[gl_VertexIndex % 6];
     bool right = corner == 1 || corner == 2;

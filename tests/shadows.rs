@@ -310,6 +310,69 @@ fn a_short_step_is_not_too_much_for_lights() {
     assert!(rmse(&coarse, &Image::new(24, 24)) > 0.1);
 }
 
+/// Rays of lights through so much of the shell at once that to count their steps, which are too many, is too much: they are gone through
+/// once more, coarsely.
+#[test]
+fn what_cannot_be_counted_is_gone_through_coarsely() {
+    let view = view(DVec3::new(0.3, 3.0, 2.0), DVec3::new(0.0, 0.25, 0.0), 30.0, 1e-3, 8);
+    let mut scene = slab(10.0, 0.5, 2.0 / 14.0, [1.0; 3], view);
+    // Fourteen slabs, one in another: 84 stretches of up to fourteen media.
+    let slab = Generator::Plane(Plane { size: 20.0, segments: 1 }).build().unwrap();
+    let mut stack =
+        Mesh { positions: Vec::new(), normals: Vec::new(), triangles: Vec::new(), uvs: Vec::new() };
+    for i in 0..14 {
+        let first = stack.positions.len() as u32;
+        let lifted = slab.positions.iter().map(|&position| position + f64::from(i) * 0.01 * DVec3::Y);
+        stack.positions.extend(lifted);
+        stack.normals.extend(&slab.normals);
+        stack.triangles.extend(slab.triangles.iter().map(|corners| corners.map(|corner| corner + first)));
+        stack.uvs.extend(&slab.uvs);
+    }
+    scene.shell = Shell::build(&stack, &ShellOptions::new(0.5)).unwrap().into();
+    light_up(&mut scene, 0.0, vec![sun(DVec3::Y, 4.0)]);
+    scene.shading.as_mut().unwrap().shadow_size = 16;
+    scene.medium.lod_footprint = 0.0; // level 0 alone, as above
+    let [coarse, fine] = [1.0, 0.1].map(|step| {
+        let scene = Scene { march: March::Default { step }, ..scene.clone() };
+        render(&scene).image
+    });
+    let difference = rmse(&coarse, &fine);
+    assert!(difference < 8e-4, "{difference}"); // as above
+    assert!(rmse(&coarse, &Image::new(8, 8)) > 0.1);
+}
+
+/// Where a wall is cut through, or begins, its surface is lit: it is before all of it, though in the light's picture half of what is
+/// beside a point is nearer to the light than the point.
+#[test]
+fn a_wall_is_not_in_its_own_shadow() {
+    let view = view(DVec3::new(2.5, 2.0, 1.5), DVec3::new(0.0, 0.25, 0.0), 50.0, 1e-3, 128);
+    let mut scene = slab(1.0, 0.5, 2.0, [1.0; 3], view);
+    let volume = Volume::new([4; 3], vec![[1.0; 4]; 64]).unwrap();
+    scene.volume = Pyramid::build(volume).into();
+    light_up(&mut scene, 0.0, vec![sun(DVec3::new(1.0, 0.9, 0.8), 4.0)]);
+    // A pixel of the light's picture is 2.9 / 126 wide at most, of a box that is 2.9 from corner to corner; on the face on which light falls
+    // most aslant, by cos 0.51, that is 0.045. So this far from an edge all four pixels around a point show its face.
+    const BESIDE: f64 = 0.1;
+    scene.shading.as_mut().unwrap().shadow_size = 128;
+    let image = render(&scene).image;
+    let eye = view.camera.eye;
+    let (low, high) = (DVec3::new(-1.0, 0.0, -1.0), DVec3::new(1.0, 0.5, 1.0));
+    let mut compared = 0;
+    for (ray, found) in rays(&view).zip(&image.rgba) {
+        // The eye is beyond all three faces: the box begins where the last of them is passed.
+        let enter = ((high - eye) / ray).max_element();
+        let point = eye + enter * ray;
+        let to_faces = (point - low).min(high - point);
+        let nearest = to_faces.to_array().map(|to_face| to_face > BESIDE);
+        if nearest.iter().filter(|&&is_far| is_far).count() == 2 && to_faces.min_element() > -1e-9 {
+            // All that the texture sends out: a wall's colour, 1, times brightness / 4.
+            assert!((found[0] - 1.0).abs() < 1e-5, "{} at {point}", found[0]);
+            compared += 1;
+        }
+    }
+    assert!(compared > 4000, "{compared}");
+}
+
 /// A light's picture shows all solids: one far away makes the shadows of the shell coarse, and that is told of.
 #[test]
 fn a_solid_far_away_comes_with_a_warning() {

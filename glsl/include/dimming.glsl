@@ -19,7 +19,7 @@ const uint PASSES_A_SAMPLE = 3;
 float knots[KNOTS];
 uint placed = 0;
 float growth = LEAST_GROWTH;
-float doublings = 0.0; // of the growth
+uint doublings = 0; // of the growth
 float all_but_dark = 3.0e38; // the depth at which LEFT is left
 
 // Where in a step of an optical depth, after another one, that one is reached.
@@ -32,7 +32,7 @@ void thin_out() {
     for (uint i = 0; i < KNOTS / 2; i++) knots[i] = knots[2 * i];
     placed = (placed + 1) / 2;
     growth *= 2.0;
-    doublings += 1.0;
+    doublings++;
 }
 
 float optical_so_far = 0.0;
@@ -80,6 +80,10 @@ void write_curve() {
     float rest = whole - float(placed - 1) * growth;
     knots[placed] = rest > 0.0 ? last + (end - last) * growth / rest : last;
     for (uint i = placed + 1; i < KNOTS; i++) knots[i] = 3.0e38;
-    out_curve[0] = vec4(2.0 * doublings + whole, knots[4], knots[8], knots[12]);
+    out_curve[0] = packed(vec4(knots[0], knots[4], knots[8], knots[12]), doublings, whole);
+    // As they will be read, and in order still.
+    vec4 firsts = unpacked(out_curve[0]).firsts;
+    for (uint i = 1; i < PARTS; i++) knots[4 * i] = firsts[i];
+    for (uint i = KNOTS - 1; i > 0; i--) knots[i - 1] = min(knots[i - 1], knots[i]);
     for (uint i = 0; i < PARTS; i++) out_curve[1 + i] = vec4(knots[4 * i], knots[4 * i + 1], knots[4 * i + 2], knots[4 * i + 3]);
 }

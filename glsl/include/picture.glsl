@@ -8,6 +8,7 @@ struct LightPicture {
     float pixel;        // distance of pixel centres: at depth 1, or of parallel rays
     uint is_parallel;   // else from a point
     float opacity_distances; // in the light's unit
+    float rounding;     // what depths of points may be off by, in the light's unit
 };
 
 #ifdef LIT

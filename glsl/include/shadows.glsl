@@ -13,21 +13,20 @@ float growths_done(vec4 from, vec4 to, float depth) {
     return dot(clamp((depth - from) / max(to - from, 1e-7), 0.0, 1.0), vec4(1.0));
 }
 
-// Of the medium alone, along the ray of the pixel whose centre is there, in parts of the image's sides. Not texelFetch, for which
+// A number of the curves' picture number `layer`, at a place in parts of the image's sides. Not texelFetch, for which
 // lavapipe 22.3 looks up the level of detail of each pixel by itself: of its instructions that is more than half.
-float transmittance_until(vec2 at, float depth) {
-    vec4 whole = textureLod(curves, vec3(at, 0.0), 0.0);
-    // Not silently: what is lit by this is not finite, and the host sees that.
-    if (whole.x == UNRESOLVED) return uintBitsToFloat(0x7f800000u);
-    float doublings = floor(0.5 * whole.x);
-    float opacity_of_all = whole.x - 2.0 * doublings;
-    int part = int(depth > whole.y) + int(depth > whole.z) + int(depth > whole.w);
-    vec4 from = textureLod(curves, vec3(at, float(1 + part)), 0.0);
-    vec4 to = vec4(from.yzw, part == 0 ? whole.y : part == 1 ? whole.z : part == 2 ? whole.w : 3.0e38);
+vec4 read(vec2 at, int layer) {
+    return textureLod(curves, vec3(at, float(layer)), 0.0);
+}
+
+// Of the medium alone, along the ray of the pixel whose centre is there.
+float transmittance_until(Curve curve, vec2 at, float depth) {
+    vec3 later = curve.firsts.yzw;
+    int part = int(depth > later.x) + int(depth > later.y) + int(depth > later.z);
+    vec4 from = read(at, 1 + part);
+    vec4 to = vec4(from.yzw, part == 0 ? later.x : part == 1 ? later.y : part == 2 ? later.z : 3.0e38);
     float done = 4.0 * float(part) + growths_done(from, to, depth);
-    // The power of two as its bits: an eighth of what `exp2` takes.
-    float growth = uintBitsToFloat(uint(127.0 + doublings) << 23) * LEAST_GROWTH;
-    return opacity_of_all == 0.0 ? 1.0 : 1.0 - min(done * growth, opacity_of_all);
+    return 1.0 - min(done * curve.growth, curve.opacity);
 }
 
 // The pixel beside its middle, to the right and upwards, and depth of a point, `vec4(point, 1)`, or of a way, `vec4(way, 0)`, in a light's
@@ -41,21 +40,23 @@ vec3 in_picture(uint index, vec4 at) {
 struct Shown {
     vec3 place;  // the pixel beside the middle, to the right and downwards, and the depth
     vec2 corner; // of the image, half a pixel up and left of it
+    float pixel; // how wide one is there
     bool is_seen;
 };
 
 Shown nowhere() {
-    return Shown(vec3(0.0), vec2(0.0), false);
+    return Shown(vec3(0.0), vec2(0.0), 0.0, false);
 }
 
 void look_in(uint index, vec3 there, bool is_parallel, inout Shown shown) {
     LightPicture light = light_pictures[index];
     if (!is_parallel) there.xy /= there.z;
     there.y = -there.y;
+    there.z -= light.rounding; // what lies on a surface is before it
     bool is_before = is_parallel || there.z > 0.0;
     // Four pixels of it are read.
     if (!shown.is_seen && is_before && max(abs(there.x), abs(there.y)) <= light.half_side - 1.0) {
-        shown = Shown(there, light.middle + there.xy - 0.5, true);
+        shown = Shown(there, light.middle + there.xy - 0.5, light.pixel * (is_parallel ? 1.0 : there.z), true);
     }
 }
 
@@ -66,23 +67,55 @@ Shown look_for(uint first, vec3 point, bool is_parallel) {
     return shown;
 }
 
+// What the medium begins with may slant, or be cut aslant: of the pixels around a point on it half show it nearer to the light, and the
+// point would be in its own shadow. So along a pixel's ray the depth beneath the surface is what counts, where the four see one: it is
+// flat, to half of a pixel, not too steep, in pixels a pixel, and not much farther than two pixels above the point.
+const float BUMPIEST = 0.5;
+const float STEEPEST = 4.0;
+const float NEAR_SURFACE = 2.0;
+
+// By how much of the distances between `begins`, where the medium begins in the pixels around it, a point at a depth
+// is looked for deeper in each; `begin` is where it begins above the point.
+float surface_at(vec4 begins, float begin, float depth, float pixel) {
+    float least = min(min(begins.x, begins.y), min(begins.z, begins.w));
+    float most = max(max(begins.x, begins.y), max(begins.z, begins.w));
+    float bump = abs(begins.x - begins.y - begins.z + begins.w);
+    // Where there is nothing it begins at 0.
+    bool is_one = least > 0.0 && most - least < STEEPEST * pixel && bump < BUMPIEST * pixel;
+    return is_one ? clamp(2.0 - (depth - begin) / (NEAR_SURFACE * pixel), 0.0, 1.0) : 0.0;
+}
+
 // The part of the light that reaches a point which is shown there.
 float let_through(Shown shown, bool is_parallel) {
     vec3 place = shown.place;
     vec2 low = floor(shown.corner);
     vec2 part = shown.corner - low;
     vec2 pixel = 1.0 / vec2(textureSize(curves, 0).xy);
+    Curve around[4];
+    vec4 begins;
+    bool is_resolved = true;
+    for (int j = 0; j < 4; j++) {
+        vec4 numbers = read((low + vec2(j & 1, j >> 1) + 0.5) * pixel, 0);
+        around[j] = unpacked(numbers);
+        begins[j] = around[j].firsts.x;
+        is_resolved = is_resolved && numbers.x != UNRESOLVED;
+    }
+    vec2 above = mix(begins.xz, begins.yw, part.x);
+    float begin = mix(above.x, above.y, part.y);
+    float slant = surface_at(begins, begin, place.z, shown.pixel);
     float sum = 0.0;
     for (int j = 0; j < 4; j++) {
         ivec2 offset = ivec2(j & 1, j >> 1);
         vec2 weights = mix(1.0 - part, part, vec2(offset));
         vec2 at = (low + vec2(offset) + 0.5) * pixel;
-        float through = transmittance_until(at, place.z);
+        float through = transmittance_until(around[j], at, place.z + slant * (begins[j] - begin));
 #ifdef SOLIDS
         vec4 blocker = textureLod(blockers, at, 0.0);
         if (blocker.w > 0.0 && place.z > blocker_depth(blocker.xyz, place.xy, is_parallel)) through = 0.0;
 #endif
         sum += weights.x * weights.y * through;
     }
-    return shown.is_seen ? sum : 1.0; // beside all that could stand in the way
+    if (!shown.is_seen) return 1.0; // beside all that could stand in the way
+    // Not silently: what is lit by this is not finite, and the host sees that.
+    return is_resolved ? sum : uintBitsToFloat(0x7f800000u);
 }

@@ -30,4 +30,5 @@ struct Tile {
     vec4 bounds;         // clip space: left, top, right, bottom
     uvec2 members;       // range of the list of cells, or of triangles: first, end
     uint picture;        // of a light: which
+    uint coarsely;       // of a light: whether its rays take the longest steps
 };

@@ -80,7 +80,7 @@ impl SeenByLight {
                 bounds: [clip(0, x), clip(1, y), clip(0, x + tile_side), clip(1, y + tile_side)],
                 members: [first, seen.members.len() as u32],
                 picture: frame.index as u32,
-                padding: 0,
+                coarsely: 0,
             });
         }
         seen

@@ -33,7 +33,7 @@ pub struct Tile {
     pub bounds: [f32; 4],
     pub members: [u32; 2],
     pub picture: u32,
-    pub padding: u32,
+    pub coarsely: u32,
 }
 
 /// The side of a [`Tile`] in pixels: small enough that few members of a large cycle reach into one.
@@ -227,7 +227,7 @@ impl Seen {
                 bounds: [clip(x, 0), clip(y, 1), clip(x + TILE, 0), clip(y + TILE, 1)],
                 members: [first, self.list.len() as u32],
                 picture: 0,
-                padding: 0,
+                coarsely: 0,
             });
         }
         self.runs.push(Run::Cycle(first_tile..self.tiles.len() as u32));

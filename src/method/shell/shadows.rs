@@ -13,6 +13,7 @@ use glam::DVec3;
 
 use super::constants::{Levels, ViewConstants, constants_of_volume};
 use super::lens::{NEAR, PictureFrame, SeenByLight};
+use super::seen::Tile;
 use super::volume::DeviceVolume;
 use super::walk::{self, RayBuffers, Ways};
 use crate::gpu::{Batch, Buffer, Draw, Gpu, Keeps, Pipeline, PipelineInfo, Sampled, Target, draw, shaders};
@@ -33,7 +34,8 @@ pub struct LightPicture {
     pub pixel: f32,
     pub is_parallel: u32,
     pub opacity_distances: f32,
-    pub padding: [u32; 2],
+    pub rounding: f32,
+    pub padding: u32,
 }
 
 /// `Blocker` of `glsl/include/blocker.glsl`: see there for each member.
@@ -185,6 +187,8 @@ impl Shadows {
                     row(view.frame.up, across),
                     row(view.frame.forward, view.far),
                 ],
+                // Of the numbers that are added up for a point, none of which is more than the longest way and the eye's.
+                rounding: 4.0 * f32::EPSILON * (1.0 + way.length() / view.far) as f32,
                 ..self.picture(index)
             }
         };
@@ -265,11 +269,16 @@ impl Shadows {
             let CurvePipelines { walk: walking, left } = pipelines.as_ref().expect("made just now");
             let cells_of_left =
                 Buffer::storage(gpu, "a light's tetrahedra, for rays that are left", &seen.cells)?;
-            let tiles = Buffer::storage(gpu, "a light's tiles", &seen.tiles)?;
+            let vertices = 0..6 * seen.tiles.len() as u32;
+            // Where steps are too many for a ray it takes the longest, in the same tile once more.
+            let coarsely = seen.tiles.iter().map(|tile| Tile { coarsely: 1, ..*tile });
+            let finely = seen.tiles.iter().copied().filter(|_| step < COARSEST_STEP);
+            let tiles: Vec<Tile> = finely.chain(coarsely).collect();
+            let of_left = 0..6 * tiles.len() as u32;
+            let tiles = Buffer::storage(gpu, "a light's tiles", &tiles)?;
             let members = Buffer::storage(gpu, "the members of a light's tiles", &seen.members)?;
             let mut buffers = vec![(0, &cells_of_left), (1, &tiles), (2, &members), (6, &pictures)];
-            let vertices = 0..6 * seen.tiles.len() as u32;
-            let mut batches = vec![Batch { pipeline: left, vertices: vertices.clone() }];
+            let mut batches = vec![Batch { pipeline: left, vertices: of_left }];
             // Where the device has no room for the crossings, no ray walks, and all are left.
             let walked = walk::holds_crossings(gpu.most_texels(), &scene.shell, &crossings).then(|| {
                 let cells = Buffer::floats(gpu, "a light's tetrahedra", &seen.cells)?;

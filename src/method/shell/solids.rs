@@ -167,7 +167,7 @@ impl SolidView {
             let first = 6 * tiles.len() as u32;
             let bounds = where_seen(&triangles[members.clone()], view);
             let members = [members.start as u32, members.end as u32];
-            tiles.extend(bounds.map(|bounds| Tile { bounds, members, picture: 0, padding: 0 }));
+            tiles.extend(bounds.map(|bounds| Tile { bounds, members, picture: 0, coarsely: 0 }));
             vertices.push(first..6 * tiles.len() as u32);
         }
         let triangles = Buffer::storage(gpu, "the solids", &triangles)?;
