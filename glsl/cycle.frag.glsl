@@ -71,14 +71,14 @@ void main() {
                     enter(hits[hit], ray);
                     // As if it were alone.
                     float optical = optical_of(texel, step * per_depth);
-                    float lit_at = depth_of_step(begin, step, optical, opacity(optical));
+                    float lit_at = depth_of_step(begin, step, optical, opacity(optical), 0.0);
                     texel = lit(texel, fetch_from(directions, path, lit_at), lit_at);
 #endif
                     add(sum, texel, step * per_depth);
                 }
                 vec4 mixed = mixture(sum);
 #ifdef DEPTH
-                float at = depth_of_step(begin, step, optical_of(sum), mixed.a);
+                float at = depth_of_step(begin, step, optical_of(sum), mixed.a, 0.0);
                 mean_distance += transmittance(gathered) * mixed.a * at * length(ray);
 #endif
                 lay_behind(gathered, mixed);

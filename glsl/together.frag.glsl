@@ -202,7 +202,7 @@ void main() {
             }
 #endif
             float alpha = opacity(optical);
-            float z = depth_of_step(step_begin, size, optical, alpha);
+            float z = depth_of_step(step_begin, size, optical, alpha, 0.0);
 #ifdef LIT
             enter(cell, ray);
             texel = lit(texel, is_even ? vec4(0.0) : fetch_from(directions, path, z), z);
@@ -219,7 +219,7 @@ void main() {
                 walker++;
                 if (walker == walkers) {
                     mixed = mixture(sum);
-                    z = depth_of_step(step_begin, size, optical_of(sum), mixed.a);
+                    z = depth_of_step(step_begin, size, optical_of(sum), mixed.a, 0.0);
                     sum = nothing();
                     walker = 0;
                     step_index++;

@@ -33,17 +33,36 @@ vec3 emitted(vec4 texel, float amount) {
     return texel.a > LEAST ? texel.rgb * (amount / texel.a) : vec3(0.0);
 }
 
-// How far into a path of an optical depth through a medium that is the same everywhere, in parts of it, the mean of what is sent out
-// comes from: `1 / t - exp(-t) / (1 - exp(-t))`. Below 1/2 the series, whose first term left out is t^5 / 30240 < 2^-19.
-float mean_depth(float optical, float alpha) {
+// How far into a step of an optical depth, in parts of it, the mean of what is sent out comes from.
+//
+// Where the extinction is the same everywhere that is `1 / t - exp(-t) / (1 - exp(-t))`; below 1/2 the series, whose first term left out is
+// t^5 / 30240 < 2^-19. Where it grows along the step as `1 + rise (2 u - 1)`, u from 0 to 1 and `rise` from -1 to 1/2, it is farther by
+// `rise / 6` if t is small, and by `rise / ((1 - rise) t)` if it is large; what joins the two here is off by 0.01 at most.
+float mean_depth(float optical, float alpha, float rise) {
     float series = 0.5 - optical * (1.0 / 12.0 - optical * optical * (1.0 / 720.0));
-    return optical < 0.5 ? series : 1.0 / optical - (1.0 - alpha) / alpha;
+    float even = optical < 0.5 ? series : 1.0 / optical - (1.0 - alpha) / alpha;
+    return even + rise / (6.0 + (1.0 - rise) * optical * (1.0 - 4.0 / (4.0 + optical)));
 }
 
 // The depth at which a step is lit, and which it counts as: the mean of where what it sends out comes from. Of a dense one that is near
 // its beginning, not in its middle, where it would be in its own shadow. The paper's plan takes the middle.
-float depth_of_step(float begin, float size, float optical, float alpha) {
-    return begin + size * (PLAN == PLAN_PAPER ? 0.5 : mean_depth(optical, alpha));
+float depth_of_step(float begin, float size, float optical, float alpha, float rise) {
+    return begin + size * (PLAN == PLAN_PAPER ? 0.5 : mean_depth(optical, alpha, rise));
+}
+
+// What is known of the step before: extinctions of neighbouring samples tell how it grows.
+float last_extinction = 0.0; // optical depth by depth along the ray
+float last_end = 0.0;
+
+// How the extinction grows along a part of steps, of which this is the optical depth, for `mean_depth`: from the sample before it in
+// the same tetrahedron, which has nothing where steps were left out. It becomes the last one.
+float rise_of(Part part, Steps steps, float optical) {
+    float here = min(optical, 1e30) / part.size;
+    float before = last_end < part.begin - 0.5 * part.size ? 0.0 : last_extinction;
+    bool is_known = part.begin > steps.begin && !part.is_even && here > 0.0;
+    last_extinction = here;
+    last_end = part.begin + part.size;
+    return is_known ? 0.5 - 0.5 * min(before / here, 3.0) : 0.0;
 }
 
 #if defined(WALKS) && defined(LIT)
@@ -71,7 +90,7 @@ void march_midpoints(Path path, Steps steps, inout uint i, float per_depth, inou
 #endif
         float optical = optical_of(texel, part.size * per_depth);
         float alpha = opacity(optical);
-        float z = depth_of_step(part.begin, part.size, optical, alpha);
+        float z = depth_of_step(part.begin, part.size, optical, alpha, rise_of(part, steps, optical));
 #ifdef LIT
         texel = lit(texel, part.is_even ? vec4(0.0) : fetch_from(directions, path, z), z);
 #endif
