@@ -54,8 +54,11 @@ void main() {
             }
             if (end < count) next = min(next, spans[end].x);
             uint samples = 0;
+            uint present = 0;
             for (uint hit = first; hit < end; hit++) {
-                if (spans[hit].y > z) samples = max(samples, sample_count(path_in(cells[hits[hit]].texture, ray), z, next));
+                if (spans[hit].y <= z) continue;
+                samples = max(samples, sample_count(path_in(cells[hits[hit]].texture, ray), z, next));
+                present++;
             }
             passes += AT_ONCE * (end - first + 2) * (samples + 3);
             if (passes > MOST_PASSES) break;
@@ -63,22 +66,24 @@ void main() {
             for (uint i = 0; i < samples; i++) {
                 float begin = z + float(i) * step;
                 Sum sum = nothing();
+                float rise = 0.0;
                 for (uint hit = first; hit < end; hit++) {
                     if (spans[hit].y <= z) continue;
                     Path path = path_in(cells[hits[hit]].texture, ray);
                     vec4 texel = fetch(path, begin + 0.5 * step);
+                    rise = rise_since_last(begin, step, extinction(texel), i == 0 || present > 1);
 #ifdef LIT
                     enter(hits[hit], ray);
                     // As if it were alone.
                     float optical = optical_of(texel, step * per_depth);
-                    float lit_at = depth_of_step(begin, step, optical, opacity(optical), 0.0);
+                    float lit_at = depth_of_step(begin, step, optical, opacity(optical), rise);
                     texel = lit(texel, fetch_from(directions, path, lit_at), lit_at);
 #endif
                     add(sum, texel, step * per_depth);
                 }
                 vec4 mixed = mixture(sum);
 #ifdef DEPTH
-                float at = depth_of_step(begin, step, optical_of(sum), mixed.a, 0.0);
+                float at = depth_of_step(begin, step, optical_of(sum), mixed.a, rise);
                 mean_distance += transmittance(gathered) * mixed.a * at * length(ray);
 #endif
                 lay_behind(gathered, mixed);

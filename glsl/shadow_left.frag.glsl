@@ -89,14 +89,17 @@ void main() {
     uint need;
     // Where steps are too many, longer ones are taken, but none longer than the shadows of a march of long steps have. To count them
     // takes passes, too: rays for which that is too much are gone through once more, coarsely.
-    if (coarsely != 0) {
+    bool is_counted = coarsely != 0;
+    if (is_counted) {
         longer = LONGEST_STEP / view.step;
     } else if (follow(ray.origin, ray.along, false, need)) {
         // All but the steps will be gone through again; and in each stretch, which has taken as much as three steps, one more for rounding.
         uint others = min(passes + passes + passes / 3, MOST_PASSES - 1);
+        is_counted = true;
         longer = clamp(float(need) / float(MOST_PASSES - others), 1.0, LONGEST_STEP / view.step);
     }
-    bool is_resolved = follow(ray.origin, ray.along, true, need);
+    bool is_resolved = is_counted && follow(ray.origin, ray.along, true, need);
+    // No early fragment tests, which would mark by its depth what is discarded, too.
     if (!is_resolved && coarsely == 0) discard;
     if (is_resolved) write_curve();
     else leave_unresolved();

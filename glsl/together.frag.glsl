@@ -202,7 +202,8 @@ void main() {
             }
 #endif
             float alpha = opacity(optical);
-            float z = depth_of_step(step_begin, size, optical, alpha, 0.0);
+            float rise = rise_since_last(step_begin, size, extinction(texel), step_index == 0 || is_even || walkers > 1);
+            float z = depth_of_step(step_begin, size, optical, alpha, rise);
 #ifdef LIT
             enter(cell, ray);
             texel = lit(texel, is_even ? vec4(0.0) : fetch_from(directions, path, z), z);
@@ -219,7 +220,7 @@ void main() {
                 walker++;
                 if (walker == walkers) {
                     mixed = mixture(sum);
-                    z = depth_of_step(step_begin, size, optical_of(sum), mixed.a, 0.0);
+                    z = depth_of_step(step_begin, size, optical_of(sum), mixed.a, rise);
                     sum = nothing();
                     walker = 0;
                     step_index++;

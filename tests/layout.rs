@@ -212,7 +212,7 @@ fn shell_structs_agree() {
     }
     for on in [&[][..], &["LIGHT"], &["LIGHT", "WALKED"]] {
         let (members, stride) = layout(shaders::TILE_VERT.with(on), "Tile");
-        assert_eq!(members, host!(Tile: bounds, members, picture));
+        assert_eq!(members, host!(Tile: bounds, members, picture, coarsely));
         assert_eq!(stride, Some(size_of::<Tile>() as u32));
     }
 }
@@ -230,8 +230,7 @@ fn structs_of_solids_and_shadows_agree() {
             .map(|family| family.with(&[]));
     for shader in shadowed().into_iter().chain(others) {
         let (members, stride) = layout(shader, "LightPicture");
-        let expected =
-            host!(LightPicture: from_world, middle, half_side, pixel, is_parallel, opacity_distances);
+        let expected = host!(LightPicture: from_world, middle, half_side, pixel, is_parallel, opacity_distances, rounding);
         assert_eq!((members, stride), (expected, Some(size_of::<LightPicture>() as u32)));
     }
 }

@@ -3,8 +3,8 @@
 // tolerance. After the last knot the opacity of all is reached.
 //
 // A picture for the whole and one for each part of four knots, so that two are read for a point. The first holds the depth of the first
-// knot, and how much deeper the first of each other part is; these are rounded to the upper 24 bits of an f32. The lower bits, of all three,
-// tell how often the growth from knot to knot was doubled, and the opacity of all.
+// knot, as it is, and how much deeper the first of each of the other three parts is, cut to the upper 24 bits of an f32. The lower bits
+// of those three tell how often the growth from knot to knot was doubled, and the opacity of all.
 
 const float UNRESOLVED = -1.0; // in all of them, where the curve is not known
 
@@ -18,7 +18,7 @@ const uint TOLD_BITS = 8; // in each of three numbers
 const uint TOLD = (1u << TOLD_BITS) - 1u;
 const uint OPACITY_BITS = 20; // of all 24; the others hold the number of doublings
 const uint MOST_OPACITY = (1u << OPACITY_BITS) - 1u;
-// No depth differs by so little; its upper bits are not those of a number that is too small to be kept as it is.
+// No depth differs by so little. Of nothing the lower bits would be a denormal number, which devices may flush.
 const float LEAST_DIFFERENCE = 1e-30;
 
 // What is told of a light's ray as a whole.
@@ -41,5 +41,6 @@ Curve unpacked(vec4 numbers) {
     vec4 firsts = vec4(numbers.x, numbers.x + uintBitsToFloat(bits & ~TOLD));
     // The power of two as its bits: an eighth of what `exp2` takes.
     float growth = uintBitsToFloat((127u + (told >> OPACITY_BITS)) << 23) * LEAST_GROWTH;
-    return Curve(firsts, growth, float(int(told & MOST_OPACITY)) / float(MOST_OPACITY));
+    int opacity = int(told & MOST_OPACITY); // signed, which processors convert at once
+    return Curve(firsts, growth, float(opacity) / float(MOST_OPACITY));
 }

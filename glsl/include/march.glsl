@@ -50,19 +50,18 @@ float depth_of_step(float begin, float size, float optical, float alpha, float r
     return begin + size * (PLAN == PLAN_PAPER ? 0.5 : mean_depth(optical, alpha, rise));
 }
 
-// What is known of the step before: extinctions of neighbouring samples tell how it grows.
-float last_extinction = 0.0; // optical depth by depth along the ray
-float last_end = 0.0;
+// Of the last sample: extinctions of two that are neighbours tell how it grows.
+float last_extinction = 0.0;
+float last_end = 0.0; // the depth where its part of the ray ends
 
-// How the extinction grows along a part of steps, of which this is the optical depth, for `mean_depth`: from the sample before it in
-// the same tetrahedron, which has nothing where steps were left out. It becomes the last one.
-float rise_of(Part part, Steps steps, float optical) {
-    float here = min(optical, 1e30) / part.size;
-    float before = last_end < part.begin - 0.5 * part.size ? 0.0 : last_extinction;
-    bool is_known = part.begin > steps.begin && !part.is_even && here > 0.0;
+// How the extinction grows along a step whose sample has this one, for `mean_depth`: from the sample before it; steps that were left out
+// have none. It is the same all along where `is_first`: where nothing before it is known. Remembers it as the last one.
+float rise_since_last(float begin, float size, float extinction, bool is_first) {
+    float here = min(extinction, 1e30);
+    float before = last_end < begin - 0.5 * size ? 0.0 : last_extinction;
     last_extinction = here;
-    last_end = part.begin + part.size;
-    return is_known ? 0.5 - 0.5 * min(before / here, 3.0) : 0.0;
+    last_end = begin + size;
+    return is_first || here == 0.0 ? 0.0 : 0.5 - 0.5 * min(before / here, 3.0);
 }
 
 #if defined(WALKS) && defined(LIT)
@@ -90,7 +89,10 @@ void march_midpoints(Path path, Steps steps, inout uint i, float per_depth, inou
 #endif
         float optical = optical_of(texel, part.size * per_depth);
         float alpha = opacity(optical);
-        float z = depth_of_step(part.begin, part.size, optical, alpha, rise_of(part, steps, optical));
+        // In another tetrahedron the texture may be another.
+        bool is_first = part.begin <= steps.begin || part.is_even;
+        float rise = rise_since_last(part.begin, part.size, extinction(texel), is_first);
+        float z = depth_of_step(part.begin, part.size, optical, alpha, rise);
 #ifdef LIT
         texel = lit(texel, part.is_even ? vec4(0.0) : fetch_from(directions, path, z), z);
 #endif

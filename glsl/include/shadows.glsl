@@ -13,7 +13,7 @@ float growths_done(vec4 from, vec4 to, float depth) {
     return dot(clamp((depth - from) / max(to - from, 1e-7), 0.0, 1.0), vec4(1.0));
 }
 
-// A number of the curves' picture number `layer`, at a place in parts of the image's sides. Not texelFetch, for which
+// What the curves' picture number `layer` holds at a place in parts of the image's sides. Not texelFetch, for which
 // lavapipe 22.3 looks up the level of detail of each pixel by itself: of its instructions that is more than half.
 vec4 read(vec2 at, int layer) {
     return textureLod(curves, vec3(at, float(layer)), 0.0);
@@ -74,8 +74,8 @@ const float BUMPIEST = 0.5;
 const float STEEPEST = 4.0;
 const float NEAR_SURFACE = 2.0;
 
-// By how much of the distances between `begins`, where the medium begins in the pixels around it, a point at a depth
-// is looked for deeper in each; `begin` is where it begins above the point.
+// How much the slant counts for a point at a depth, 0 to 1: `begins` are the depths where the medium begins in the four pixels around it,
+// and `begin` is their mean at the point. So much of the difference of the two is added to the point's depth in each pixel.
 float surface_at(vec4 begins, float begin, float depth, float pixel) {
     float least = min(min(begins.x, begins.y), min(begins.z, begins.w));
     float most = max(max(begins.x, begins.y), max(begins.z, begins.w));
@@ -91,31 +91,29 @@ float let_through(Shown shown, bool is_parallel) {
     vec2 low = floor(shown.corner);
     vec2 part = shown.corner - low;
     vec2 pixel = 1.0 / vec2(textureSize(curves, 0).xy);
+    vec2 places[4];
     Curve around[4];
     vec4 begins;
-    bool is_resolved = true;
     for (int j = 0; j < 4; j++) {
-        vec4 numbers = read((low + vec2(j & 1, j >> 1) + 0.5) * pixel, 0);
+        places[j] = (low + vec2(j & 1, j >> 1) + 0.5) * pixel;
+        vec4 numbers = read(places[j], 0);
         around[j] = unpacked(numbers);
+        // Not silently: what is lit through this is not finite, and the host sees that.
+        if (numbers.x == UNRESOLVED) around[j].opacity = uintBitsToFloat(0xff800000u);
         begins[j] = around[j].firsts.x;
-        is_resolved = is_resolved && numbers.x != UNRESOLVED;
     }
     vec2 above = mix(begins.xz, begins.yw, part.x);
     float begin = mix(above.x, above.y, part.y);
     float slant = surface_at(begins, begin, place.z, shown.pixel);
     float sum = 0.0;
     for (int j = 0; j < 4; j++) {
-        ivec2 offset = ivec2(j & 1, j >> 1);
-        vec2 weights = mix(1.0 - part, part, vec2(offset));
-        vec2 at = (low + vec2(offset) + 0.5) * pixel;
-        float through = transmittance_until(around[j], at, place.z + slant * (begins[j] - begin));
+        vec2 weights = mix(1.0 - part, part, vec2(j & 1, j >> 1));
+        float through = transmittance_until(around[j], places[j], place.z + slant * (begins[j] - begin));
 #ifdef SOLIDS
-        vec4 blocker = textureLod(blockers, at, 0.0);
+        vec4 blocker = textureLod(blockers, places[j], 0.0);
         if (blocker.w > 0.0 && place.z > blocker_depth(blocker.xyz, place.xy, is_parallel)) through = 0.0;
 #endif
         sum += weights.x * weights.y * through;
     }
-    if (!shown.is_seen) return 1.0; // beside all that could stand in the way
-    // Not silently: what is lit by this is not finite, and the host sees that.
-    return is_resolved ? sum : uintBitsToFloat(0x7f800000u);
+    return shown.is_seen ? sum : 1.0; // beside all that could stand in the way
 }

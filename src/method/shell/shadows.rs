@@ -187,7 +187,8 @@ impl Shadows {
                     row(view.frame.up, across),
                     row(view.frame.forward, view.far),
                 ],
-                // Of the numbers that are added up for a point, none of which is more than the longest way and the eye's.
+                // A point's depth, and the three products and three sums that make the light's of it, are rounded by half of EPSILON each,
+                // and none is more than the way through all and the eye's to it; one more for the curve.
                 rounding: 4.0 * f32::EPSILON * (1.0 + way.length() / view.far) as f32,
                 ..self.picture(index)
             }
@@ -269,7 +270,7 @@ impl Shadows {
             let CurvePipelines { walk: walking, left } = pipelines.as_ref().expect("made just now");
             let cells_of_left =
                 Buffer::storage(gpu, "a light's tetrahedra, for rays that are left", &seen.cells)?;
-            let vertices = 0..6 * seen.tiles.len() as u32;
+            let of_walked = 0..6 * seen.tiles.len() as u32;
             // Where steps are too many for a ray it takes the longest, in the same tile once more.
             let coarsely = seen.tiles.iter().map(|tile| Tile { coarsely: 1, ..*tile });
             let finely = seen.tiles.iter().copied().filter(|_| step < COARSEST_STEP);
@@ -289,7 +290,7 @@ impl Shadows {
             if let Some((cells, rays)) = &walked {
                 buffers.extend([(18, cells), (19, ways.beyond())]);
                 buffers.extend(rays.buffers());
-                batches.insert(0, Batch { pipeline: walking, vertices });
+                batches.insert(0, Batch { pipeline: walking, vertices: of_walked });
             }
             draw(&Draw {
                 target: &self.curves,
