@@ -67,22 +67,23 @@ Shown look_for(uint first, vec3 point, bool is_parallel) {
     return shown;
 }
 
-// What the medium begins with may slant, or be cut aslant: of the pixels around a point on it half show it nearer to the light, and the
-// point would be in its own shadow. So along a pixel's ray the depth beneath the surface is what counts, where the four see one: it is
-// flat, to half of a pixel, not too steep, in pixels a pixel, and not much farther than two pixels above the point.
+// A surface may slant, or be cut aslant: of the pixels around a point on it half show it nearer to the light, and the point would be in
+// its own shadow. So along a pixel's ray the depth beneath the surface is what counts, where the four see one: it is flat, to half of a
+// pixel, not too steep, in pixels a pixel, and not much farther than two pixels above the point. A pixel's surface is where a quarter to a
+// half of its opacity is reached: where its medium begins is told by where a step of the light's ray does.
 const float BUMPIEST = 0.5;
 const float STEEPEST = 4.0;
 const float NEAR_SURFACE = 2.0;
 
-// How much the slant counts for a point at a depth, 0 to 1: `begins` are the depths where the medium begins in the four pixels around it,
-// and `begin` is their mean at the point. So much of the difference of the two is added to the point's depth in each pixel.
-float surface_at(vec4 begins, float begin, float depth, float pixel) {
-    float least = min(min(begins.x, begins.y), min(begins.z, begins.w));
-    float most = max(max(begins.x, begins.y), max(begins.z, begins.w));
-    float bump = abs(begins.x - begins.y - begins.z + begins.w);
-    // Where there is nothing it begins at 0.
+// How much the slant counts for a point at a depth, 0 to 1: `surfaces` are the depths of those in the four pixels around it, and `surface`
+// is their mean at the point. So much of the difference of the two is added to the point's depth in each pixel.
+float slant_at(vec4 surfaces, float surface, float depth, float pixel) {
+    float least = min(min(surfaces.x, surfaces.y), min(surfaces.z, surfaces.w));
+    float most = max(max(surfaces.x, surfaces.y), max(surfaces.z, surfaces.w));
+    float bump = abs(surfaces.x - surfaces.y - surfaces.z + surfaces.w);
+    // Where there is nothing it is at 0.
     bool is_one = least > 0.0 && most - least < STEEPEST * pixel && bump < BUMPIEST * pixel;
-    return is_one ? clamp(2.0 - (depth - begin) / (NEAR_SURFACE * pixel), 0.0, 1.0) : 0.0;
+    return is_one ? clamp(2.0 - (depth - surface) / (NEAR_SURFACE * pixel), 0.0, 1.0) : 0.0;
 }
 
 // The part of the light that reaches a point which is shown there.
@@ -93,22 +94,22 @@ float let_through(Shown shown, bool is_parallel) {
     vec2 pixel = 1.0 / vec2(textureSize(curves, 0).xy);
     vec2 places[4];
     Curve around[4];
-    vec4 begins;
+    vec4 surfaces;
     for (int j = 0; j < 4; j++) {
         places[j] = (low + vec2(j & 1, j >> 1) + 0.5) * pixel;
         vec4 numbers = read(places[j], 0);
         around[j] = unpacked(numbers);
         // Not silently: what is lit through this is not finite, and the host sees that.
         if (numbers.x == UNRESOLVED) around[j].opacity = uintBitsToFloat(0xff800000u);
-        begins[j] = around[j].firsts.x;
+        surfaces[j] = around[j].firsts.y;
     }
-    vec2 above = mix(begins.xz, begins.yw, part.x);
-    float begin = mix(above.x, above.y, part.y);
-    float slant = surface_at(begins, begin, place.z, shown.pixel);
+    vec2 rows = mix(surfaces.xz, surfaces.yw, part.x);
+    float surface = mix(rows.x, rows.y, part.y);
+    float slant = slant_at(surfaces, surface, place.z, shown.pixel);
     float sum = 0.0;
     for (int j = 0; j < 4; j++) {
         vec2 weights = mix(1.0 - part, part, vec2(j & 1, j >> 1));
-        float through = transmittance_until(around[j], places[j], place.z + slant * (begins[j] - begin));
+        float through = transmittance_until(around[j], places[j], place.z + slant * (surfaces[j] - surface));
 #ifdef SOLIDS
         vec4 blocker = textureLod(blockers, places[j], 0.0);
         if (blocker.w > 0.0 && place.z > blocker_depth(blocker.xyz, place.xy, is_parallel)) through = 0.0;
