@@ -100,7 +100,7 @@ void main() {
     }
     bool is_resolved = is_counted && follow(ray.origin, ray.along, true, need);
     // No early fragment tests, which would mark by its depth what is discarded, too.
-    if (!is_resolved && coarsely == 0) discard;
     if (is_resolved) write_curve();
-    else leave_unresolved();
+    else if (coarsely != 0) leave_unresolved();
+    else discard;
 }

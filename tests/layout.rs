@@ -230,7 +230,8 @@ fn structs_of_solids_and_shadows_agree() {
             .map(|family| family.with(&[]));
     for shader in shadowed().into_iter().chain(others) {
         let (members, stride) = layout(shader, "LightPicture");
-        let expected = host!(LightPicture: from_world, middle, half_side, pixel, is_parallel, opacity_distances, rounding);
+        let expected = host!(LightPicture: from_world, middle, half_side, pixel, is_parallel,
+            opacity_distances, rounding);
         assert_eq!((members, stride), (expected, Some(size_of::<LightPicture>() as u32)));
     }
 }
