@@ -162,17 +162,25 @@ fn shadows_agree_with_the_reference() {
     }
 }
 
+/// As a part of its own, which shares no vertices.
+fn add_to(mesh: &mut Mesh, part: Mesh) {
+    let first = mesh.positions.len() as u32;
+    mesh.positions.extend(part.positions);
+    mesh.normals.extend(part.normals);
+    mesh.triangles.extend(part.triangles.iter().map(|corners| corners.map(|corner| corner + first)));
+    mesh.uvs.extend(part.uvs);
+}
+
 /// Where the shell is in itself, media add, for lights as for the eye: two rings that go through one another.
 #[test]
 fn shadows_of_a_shell_that_overlaps_itself_agree_with_the_reference() {
     let one = Generator::Torus(Torus { segments: 24, rings: 12, ..Torus::default() }).build().unwrap();
-    let mut two = one.clone();
-    let count = one.positions.len() as u32;
     let turned = |v: DVec3| DVec3::new(v.x, -v.z, v.y);
-    two.positions.extend(one.positions.iter().map(|&at| turned(at) + 0.4 * DVec3::X));
-    two.normals.extend(one.normals.iter().map(|&normal| turned(normal)));
-    two.uvs.extend(&one.uvs);
-    two.triangles.extend(one.triangles.iter().map(|corners| corners.map(|corner| corner + count)));
+    let mut other = one.clone();
+    other.positions.iter_mut().for_each(|position| *position = turned(*position) + 0.4 * DVec3::X);
+    other.normals.iter_mut().for_each(|normal| *normal = turned(*normal));
+    let mut two = one;
+    add_to(&mut two, other);
     let options = ShellOptions { uv_scale: DVec2::new(6.0, 2.0), ..ShellOptions::new(0.3) };
     let mut scene = ring();
     scene.shell = Arc::new(Shell::build(&two, &options).unwrap());
@@ -318,15 +326,11 @@ fn what_is_too_much_to_count_is_gone_through_coarsely() {
     let mut scene = slab(10.0, 0.5, 2.0 / 14.0, [1.0; 3], view);
     // Fourteen slabs, one in another, together as dense as the one above: 55 stretches of up to fourteen media.
     let slab = Generator::Plane(Plane { size: 20.0, segments: 1 }).build().unwrap();
-    let mut stack =
-        Mesh { positions: Vec::new(), normals: Vec::new(), triangles: Vec::new(), uvs: Vec::new() };
-    for i in 0..14 {
-        let first = stack.positions.len() as u32;
-        let lifted = slab.positions.iter().map(|&position| position + f64::from(i) * 0.01 * DVec3::Y);
-        stack.positions.extend(lifted);
-        stack.normals.extend(&slab.normals);
-        stack.triangles.extend(slab.triangles.iter().map(|corners| corners.map(|corner| corner + first)));
-        stack.uvs.extend(&slab.uvs);
+    let mut stack = slab.clone();
+    for i in 1..14 {
+        let mut lifted = slab.clone();
+        lifted.positions.iter_mut().for_each(|position| position.y += f64::from(i) * 0.01);
+        add_to(&mut stack, lifted);
     }
     scene.shell = Shell::build(&stack, &ShellOptions::new(0.5)).unwrap().into();
     light_up(&mut scene, 0.0, vec![sun(DVec3::Y, 4.0)]);
