@@ -109,7 +109,7 @@ fn halved(finer: &DirectionLevel) -> DirectionLevel {
         }
         sum.map(|sum| (sum / parts) as f32)
     };
-    DirectionLevel { size, texels: texels_of(size, [0.0; 4], texel) }
+    DirectionLevel { size, texels: texels_of(size, texel) }
 }
 
 #[cfg(test)]

@@ -2,7 +2,7 @@
 //! column whether merged at once or two by two.
 
 use super::coverage::{Coverage, index_of, stored, texels_of};
-use super::medium::Passage;
+use super::medium::{Passage, opacity};
 use crate::volume::Volume;
 
 /// Pieces of columns, looked at from above or, of two sides, from below as well.
@@ -14,18 +14,20 @@ pub struct Columns<const SIDES: usize> {
 }
 
 /// A [`Passage`], in less memory.
-#[derive(Clone, Copy)]
 struct Piece<const SIDES: usize> {
     depth: f64,
+    opacity: f64,
     /// Light for its opacity, seen from each side.
     straight: [[f32; 3]; SIDES],
 }
 
 impl<const SIDES: usize> Columns<SIDES> {
-    /// The columns of a volume along an axis, in `coarse` pieces each. A texel is `edge` opacity distances long there.
-    pub fn of(volume: &Volume, axis: usize, coarse: u32, edge: f64) -> Self {
+    /// The columns of a volume along an axis, in `coarse` pieces each. A texel is `edge` opacity distances long there; `depths` are
+    /// those of the volume's texels over one.
+    pub fn of(volume: &Volume, depths: &[f64], axis: usize, coarse: u32, edge: f64) -> Self {
         let through = |place, part: f64| {
-            Passage::through(volume.texel(place).map(f64::from), part * edge, volume.quantity)
+            let index = index_of(volume.size, place);
+            Passage::through(volume.texels[index].map(f64::from), depths[index] * (part * edge))
         };
         Self::merged(volume.size, axis, coarse, through)
     }
@@ -44,26 +46,33 @@ impl<const SIDES: usize> Columns<SIDES> {
         let mut size = fine;
         size[axis] = coarse;
         let coverage = Coverage::new(fine[axis], coarse);
-        let nothing = Piece { depth: 0.0, straight: [[0.0; 3]; SIDES] };
-        let pieces = texels_of(size, nothing, |at| {
-            let passages = coverage.of(at[axis]).iter().map(|&(texel, part)| {
+        let pieces = texels_of(size, |at| {
+            let mut whole = Passage::NOTHING;
+            for &(texel, part) in coverage.of(at[axis]) {
                 let mut place = at;
                 place[axis] = texel;
-                through(place, part)
-            });
-            let whole = passages.reduce(Passage::under).unwrap_or(Passage::NOTHING);
-            Piece { depth: whole.depth, straight: whole.straight().map(|colour| colour.map(stored)) }
+                whole = whole.under(through(place, part));
+            }
+            let straight = whole.straight().map(|colour| colour.map(stored));
+            Piece { depth: whole.depth, opacity: whole.opacity(), straight }
         });
         Self { size, axis, pieces }
     }
 
     /// Through what one piece is of, as many times as long as it is.
+    #[inline(always)] // as those of `Passage`
     pub fn passage(&self, at: [u32; 3], times: f64) -> Passage<SIDES> {
-        let Piece { depth, straight } = *self.piece(at);
+        let Piece { depth, opacity: once, straight } = *self.piece(at);
         if depth == 0.0 {
             return Passage::NOTHING;
         }
-        Passage::of(depth * times, straight.map(|colour| colour.map(f64::from)))
+        // Most are passed once or twice, which needs no exponential.
+        let opacity = match times {
+            1.0 => once,
+            2.0 => once * (2.0 - once),
+            _ => opacity(depth * times),
+        };
+        Passage::of(depth * times, opacity, straight.map(|colour| colour.map(f64::from)))
     }
 
     /// Whether nothing is in a piece.

@@ -71,7 +71,7 @@ impl VolumeCoverage {
 
 /// A volume whose texels are computed in f64 and independently, so that it does not depend on the threads.
 pub fn volume_of(size: [u32; 3], quantity: Quantity, texel: impl Fn([u32; 3]) -> [f64; 4] + Sync) -> Volume {
-    Volume { size, texels: texels_of(size, [0.0; 4], |at| texel(at).map(stored)), quantity }
+    Volume { size, texels: texels_of(size, |at| texel(at).map(stored)), quantity }
 }
 
 /// Rounded to f32. Only a glow near its end, gathered from several layers, would overflow.
@@ -85,21 +85,15 @@ pub fn index_of(size: [u32; 3], [u, v, w]: [u32; 3]) -> usize {
     (w * height + v) * width + u
 }
 
-/// Something for each texel of a volume, computed independently; `filler` is nothing of it.
-pub fn texels_of<T: Copy + Send + Sync>(
-    size: [u32; 3],
-    filler: T,
-    texel: impl Fn([u32; 3]) -> T + Sync,
-) -> Vec<T> {
+/// Something for each texel of a volume, computed independently.
+pub fn texels_of<T: Send>(size: [u32; 3], texel: impl Fn([u32; 3]) -> T + Sync) -> Vec<T> {
     let [width, height, depth] = size.map(|n| n as usize);
-    let mut texels = vec![filler; width * height * depth];
-    texels.par_chunks_mut(width).enumerate().for_each(|(row, out)| {
-        let (v, w) = ((row % height) as u32, (row / height) as u32);
-        for (u, out) in (0..).zip(out) {
-            *out = texel([u, v, w]);
-        }
-    });
-    texels
+    let at = |index: usize| {
+        let row = index / width;
+        [index % width, row % height, row / height].map(|i| i as u32)
+    };
+    let all = (0..width * height * depth).into_par_iter().with_min_len(width);
+    all.map(|index| texel(at(index))).collect()
 }
 
 #[cfg(test)]

@@ -21,7 +21,7 @@
 use super::column::Columns;
 use super::coverage::{Coverage, index_of, texels_of, volume_of};
 use super::geometry::Geometry;
-use super::medium::Passage;
+use super::medium::{Passage, depths};
 use super::visibility::Visibility;
 use crate::volume::Volume;
 
@@ -31,12 +31,13 @@ const REACH: f64 = 2.0;
 
 /// The levels after the full volume.
 pub fn levels(full: &Volume, geometry: &Geometry) -> Vec<Volume> {
-    let visibility = Visibility::from_above(full, geometry.edges(0)[2]);
+    let depths = &depths(full);
+    let visibility = Visibility::from_above(full.size, depths, geometry.edges(0)[2]);
     // One after the other, as each holds as much as the volume again. From outside, u and v are seen from either side, w from above.
     let seen = [
-        beams_along(full, geometry, 0, Some(&visibility), Passage::of_both_sides),
-        beams_along(full, geometry, 1, Some(&visibility), Passage::of_both_sides),
-        beams_along(full, geometry, 2, None, |passage: Passage| passage),
+        beams_along(full, depths, geometry, 0, Some(&visibility), Passage::of_both_sides),
+        beams_along(full, depths, geometry, 1, Some(&visibility), Passage::of_both_sides),
+        beams_along(full, depths, geometry, 2, None, |passage: Passage| passage),
     ];
     let merged = |level: usize| {
         let size = geometry.sizes[level];
@@ -54,6 +55,7 @@ pub fn levels(full: &Volume, geometry: &Geometry) -> Vec<Volume> {
 /// without `visibility` all is seen.
 fn beams_along<const SIDES: usize>(
     full: &Volume,
+    depths: &[f64],
     geometry: &Geometry,
     axis: usize,
     visibility: Option<&Visibility>,
@@ -64,7 +66,7 @@ fn beams_along<const SIDES: usize>(
     for (level, size) in geometry.sizes.iter().enumerate().skip(1) {
         let pieces = size[axis];
         let (merged, finer) = match &columns {
-            None => (Columns::of(full, axis, pieces, geometry.edges(0)[axis]), visibility),
+            None => (Columns::of(full, depths, axis, pieces, geometry.edges(0)[axis]), visibility),
             Some((columns, visible)) => (columns.coarser(pieces), visible.as_ref()),
         };
         let visible = finer.map(|finer| finer.mean_along(axis, pieces));
@@ -89,7 +91,7 @@ fn bundles<const SIDES: usize>(
     // In edges of the texel.
     let reach = if axis == 2 { 1.0 } else { REACH };
     let stretch = geometry.beam_length(level) / (geometry.edges(level)[axis] * reach);
-    texels_of(size, Passage::NOTHING, |at| {
+    texels_of(size, |at| {
         let [first, second] = [0, 1].map(|i| coverage[i].of(at[across[i]]));
         let covered = || {
             second.iter().flat_map(|&(b, part_b)| {
@@ -108,8 +110,7 @@ fn bundles<const SIDES: usize>(
             let visible = visibility.map_or(1.0, |visibility| visibility.at(column));
             (area * visible, columns.passage(column, reach))
         });
-        let mean = Passage::mean(passages.collect::<Vec<_>>().into_iter());
-        seen(mean).stretched(stretch)
+        seen(Passage::mean(passages)).stretched(stretch)
     })
 }
 

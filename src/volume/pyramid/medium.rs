@@ -8,7 +8,9 @@
 //!   E(a, t) = (1 - exp(-D(a) t)) / a       nothing where a is 0
 //! ```
 
-use crate::volume::Quantity;
+use rayon::prelude::*;
+
+use crate::volume::{Quantity, Volume};
 
 /// What passes through a piece of medium, or comes out of it, where it is looked at from so many sides.
 #[derive(Debug, Clone, Copy)]
@@ -21,50 +23,51 @@ pub struct Passage<const SIDES: usize = 1> {
     light: [[f64; 3]; SIDES],
 }
 
+// Inlined, as they otherwise go from one to the other through memory: a tenth of the time to filter a volume.
 impl<const SIDES: usize> Passage<SIDES> {
     /// Through nothing.
     pub const NOTHING: Self = Self { depth: 0.0, opacity: 0.0, light: [[0.0; 3]; SIDES] };
 
-    /// Through a texel over a length.
-    pub fn through(texel: [f64; 4], length: f64, quantity: Quantity) -> Self {
+    /// Through a texel that is so deep.
+    #[inline(always)]
+    pub fn through(texel: [f64; 4], depth: f64) -> Self {
         let [red, green, blue, alpha] = texel;
         if alpha == 0.0 {
             return Self::NOTHING;
         }
-        let straight = [red, green, blue].map(|colour| colour / alpha);
-        Self::of(depth(alpha, quantity) * length, [straight; SIDES])
+        let inverse = alpha.recip();
+        let straight = [red, green, blue].map(|colour| colour * inverse);
+        Self::of(depth, opacity(depth), [straight; SIDES])
     }
 
-    /// Through what is of one colour, seen from each side, throughout: so deep, and with so much light for its opacity.
-    pub fn of(depth: f64, straight: [[f64; 3]; SIDES]) -> Self {
-        let opacity = opacity(depth);
+    /// Through what is of one colour, seen from each side, throughout: so deep, which is so opaque, and with so much light for its
+    /// opacity.
+    #[inline(always)]
+    pub fn of(depth: f64, opacity: f64, straight: [[f64; 3]; SIDES]) -> Self {
         Self { depth, opacity, light: straight.map(|colour| colour.map(|colour| colour * opacity)) }
     }
 
+    /// The part of the light that does not pass.
+    pub fn opacity(&self) -> f64 {
+        self.opacity
+    }
+
     /// Its light for its opacity, seen from each side.
+    #[inline(always)]
     pub fn straight(&self) -> [[f64; 3]; SIDES] {
-        let opacity = if self.depth == 0.0 { 1.0 } else { self.opacity };
-        self.light.map(|light| light.map(|light| light / opacity))
+        let inverse = if self.depth == 0.0 { 1.0 } else { self.opacity.recip() };
+        self.light.map(|light| light.map(|light| light * inverse))
     }
 
     /// As many times as long.
     pub fn stretched(self, times: f64) -> Self {
-        Self::of(self.depth * times, self.straight())
-    }
-
-    /// Whether nothing is there.
-    fn is_empty(&self) -> bool {
-        self.depth == 0.0 && self.light == [[0.0; 3]; SIDES]
+        let depth = self.depth * times;
+        Self::of(depth, opacity(depth), self.straight())
     }
 
     /// This, with another above it.
+    #[inline(always)]
     pub fn under(self, above: Self) -> Self {
-        if self.is_empty() {
-            return above;
-        }
-        if above.is_empty() {
-            return self;
-        }
         let over = |near: &Self, far: &Self, side: usize| {
             std::array::from_fn(|c| near.light[side][c] + (1.0 - near.opacity) * far.light[side][c])
         };
@@ -81,6 +84,7 @@ impl<const SIDES: usize> Passage<SIDES> {
     }
 
     /// The mean transmittance and the mean light of passages side by side, each with its weight.
+    #[inline(always)]
     pub fn mean(passages: impl Iterator<Item = (f64, Self)> + Clone) -> Self {
         // Relative to the thinnest, so that neither 1 - opacity nor a transmittance below 1e-308 is rounded away.
         let thinnest = passages.clone().map(|(_, passage)| passage);
@@ -139,6 +143,11 @@ impl Passage {
     }
 }
 
+/// `D(a)` of each texel of a volume.
+pub fn depths(volume: &Volume) -> Vec<f64> {
+    volume.texels.par_iter().map(|texel| depth(f64::from(texel[3]), volume.quantity)).collect()
+}
+
 /// `D(a)`.
 pub fn depth(alpha: f64, quantity: Quantity) -> f64 {
     match quantity {
@@ -164,7 +173,7 @@ mod tests {
     #[test]
     fn the_mean_of_transmittances_keeps_its_accuracy_at_both_ends() {
         let mean = |depths: &[f64]| {
-            let passages = depths.iter().map(|&depth| (0.5, Passage::of(depth, [[0.0; 3]])));
+            let passages = depths.iter().map(|&depth| (0.5, Passage::of(depth, opacity(depth), [[0.0; 3]])));
             Passage::<1>::mean(passages).depth
         };
         for depth in [0.0, 1e-300, 1e-9, 1.0, 1e5, f64::INFINITY] {
@@ -181,7 +190,8 @@ mod tests {
         for quantity in [Quantity::Opacity, Quantity::Extinction] {
             for texel in [[0.1, 0.2, 0.3, 0.4], [3.0, 0.0, 0.5, 1.0], [1e-7, 0.0, 0.0, 1e-9], [0.0; 4]] {
                 for length in [0.01, 1.0, 40.0] {
-                    let back = Passage::<1>::through(texel, length, quantity).texel(length, quantity);
+                    let whole = depth(texel[3], quantity) * length;
+                    let back = Passage::<1>::through(texel, whole).texel(length, quantity);
                     // An opacity near 1 - exp(-40 / 2) is rounded by 1e-16 of exp(20): of no matter in f32.
                     let near = |(a, b): (&f64, &f64)| (a - b).abs() <= 1e-12 * b.abs();
                     assert!(back.iter().zip(&texel).all(near), "{texel:?} over {length}: {back:?}");
@@ -193,7 +203,7 @@ mod tests {
     #[test]
     fn one_passage_hides_another_from_its_own_side() {
         fn stacks<const SIDES: usize>() -> [[[f64; 3]; SIDES]; 2] {
-            let through = |texel| Passage::<SIDES>::through(texel, 1.0, Quantity::Opacity);
+            let through = |texel: [f64; 4]| Passage::<SIDES>::through(texel, optical_depth(texel[3]));
             let (veil, wall) = (through([0.0, 0.5, 0.0, 0.5]), through([1.0, 0.0, 0.0, 1.0]));
             assert_eq!(veil.under(wall).depth, f64::INFINITY);
             [wall.under(veil), veil.under(wall)].map(|stack| stack.light)

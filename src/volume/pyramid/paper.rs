@@ -16,6 +16,7 @@
 use super::column::Columns;
 use super::coverage::{Coverage, texels_per_coarse, volume_of};
 use super::geometry::Geometry;
+use super::medium::depths;
 use crate::volume::Volume;
 
 /// The levels after the full volume, each from the one before it.
@@ -30,7 +31,7 @@ pub fn levels(full: &Volume, geometry: &Geometry) -> Vec<Volume> {
 
 /// The level of `size` after `finer`, whose layers are `thickness` opacity distances thick.
 fn next(finer: &Volume, size: [u32; 3], thickness: f64) -> Volume {
-    let columns = Columns::<1>::of(finer, 2, size[2], thickness);
+    let columns = Columns::<1>::of(finer, &depths(finer), 2, size[2], thickness);
     let length = thickness * texels_per_coarse(finer.size[2], size[2]);
     let columns =
         volume_of(columns.size, finer.quantity, |at| columns.passage(at, 1.0).texel(length, finer.quantity));

@@ -10,7 +10,7 @@
 
 use super::coverage::{VolumeCoverage, volume_of};
 use super::geometry::Geometry;
-use super::medium::Passage;
+use super::medium::{Passage, depth};
 use crate::volume::Volume;
 
 /// The levels after the full volume.
@@ -23,7 +23,8 @@ fn merged(full: &Volume, size: [u32; 3], length: f64) -> Volume {
     let coverage = VolumeCoverage::new(full.size, size);
     volume_of(size, full.quantity, |at| {
         let passages = coverage.of(at).map(|(place, part)| {
-            (part, Passage::through(full.texel(place).map(f64::from), length, full.quantity))
+            let texel = full.texel(place).map(f64::from);
+            (part, Passage::through(texel, depth(texel[3], full.quantity) * length))
         });
         Passage::mean(passages).texel(length, full.quantity)
     })

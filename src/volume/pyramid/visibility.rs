@@ -3,8 +3,6 @@
 use rayon::prelude::*;
 
 use super::coverage::{Coverage, index_of, texels_of, texels_per_coarse};
-use super::medium::depth;
-use crate::volume::Volume;
 
 /// Rays come in at a slant, and their way down is as much longer: `int (1 / cos) cos / int cos` over the hemisphere.
 const MEAN_SLANT: f64 = 2.0;
@@ -19,20 +17,21 @@ pub struct Visibility {
 }
 
 impl Visibility {
-    /// Of the middle of each texel, through the layers above it, which are `layer` opacity distances thick.
-    pub fn from_above(volume: &Volume, layer: f64) -> Self {
-        let slice = volume.size[0] as usize * volume.size[1] as usize;
-        let mut parts = vec![0.0; volume.texels.len()];
+    /// Of the middle of each texel of a volume of `size`, through the layers above it, which are `layer` opacity distances thick;
+    /// `depths` are those of its texels over one.
+    pub fn from_above(size: [u32; 3], depths: &[f64], layer: f64) -> Self {
+        let slice = size[0] as usize * size[1] as usize;
+        let mut parts = vec![0.0; depths.len()];
         let mut above = vec![0.0; slice];
-        for (parts, texels) in parts.chunks_mut(slice).zip(volume.texels.chunks(slice)).rev() {
-            let columns = parts.par_iter_mut().zip(texels).zip(&mut above);
-            columns.for_each(|((part, texel), above)| {
-                let within = MEAN_SLANT * layer * depth(f64::from(texel[3]), volume.quantity);
+        for (parts, depths) in parts.chunks_mut(slice).zip(depths.chunks(slice)).rev() {
+            let columns = parts.par_iter_mut().zip(depths).zip(&mut above);
+            columns.for_each(|((part, depth), above)| {
+                let within = MEAN_SLANT * layer * depth;
                 *part = (-(*above + 0.5 * within)).exp().max(LEAST) as f32;
                 *above += within;
             });
         }
-        Self { size: volume.size, parts }
+        Self { size, parts }
     }
 
     /// Of one texel.
@@ -54,7 +53,7 @@ impl Visibility {
             });
             (parts.sum::<f64>() / texels_per_coarse(fine, coarse)) as f32
         };
-        Self { size, parts: texels_of(size, 0.0, mean) }
+        Self { size, parts: texels_of(size, mean) }
     }
 }
 
@@ -64,9 +63,8 @@ mod tests {
 
     #[test]
     fn what_lies_above_hides() {
-        let texel = |alpha: f32| [0.0, 0.0, 0.0, alpha];
-        let texels = [0.5, 0.0, 0.5, 1.0, 0.25, 0.0].map(texel).to_vec();
-        let visibility = Visibility::from_above(&Volume::new([2, 1, 3], texels).unwrap(), 0.5);
+        let depths = [0.5, 0.0, 0.5, 1.0, 0.25, 0.0].map(|alpha: f64| -(-alpha).ln_1p());
+        let visibility = Visibility::from_above([2, 1, 3], &depths, 0.5);
         // From the top: a quarter, then half of the light is stopped, of a slanted ray through half an opacity distance.
         let left = [0.75_f64.sqrt(), 0.75 * 0.5_f64.sqrt(), 0.75 * 0.5 * 0.5_f64.sqrt()];
         for (w, expected) in [(2, left[0]), (1, left[1]), (0, left[2])] {
