@@ -201,6 +201,8 @@ recipe = "fog.toml"
         ["[image]\nbackground = [0, 1, 0, 1]", "[0, 1, 0, 1]", "a list of 3"],
         ["[march]\nplan = 'papr'", "'papr'", "`default`, `paper`, `exact`"],
         ["[march]\nsamples = 0", "0", "from 1 to 4096"],
+        ["[march]\nno_skip = 'levels'", "'levels'", "expected a list, written [...]"],
+        ["[light.sun]\ndirection = [0, -1, 0]", "light", "expected a list of tables, each headed [[...]]"],
         ["[march]\nstep = 0", "0", "from 0.001"],
         ["[camera]\neye = [0, 0, 1]", "[camera]", "missing key `target`"],
         ["[camera]\neye = [1, 2, 3]\ntarget = [1, 2, 3.0]", "[1, 2, 3.0]", "other than the eye"],
@@ -333,6 +335,7 @@ recipe = "fog.toml"
             ("[shell]\nthickness=1", "not a dotted key"),
             ("camera.eye=[0,0,1]", "missing key `target`"),
             ("image.background=#12345", "a colour such as"),
+            ("march.no_skip=1", "expected a list"),
         ];
         for (text, part) in mistakes {
             // One that is right stands before, so that blame must find its way.

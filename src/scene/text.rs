@@ -159,11 +159,22 @@ impl Text {
 
     /// The reader's error in a scene's words instead of Rust's.
     fn blame(&self, error: &toml::de::Error) -> Error {
-        let message = error.message().replace(" field `", " key `").replace(" variant `", " name `");
-        let message = message.replace("expected f64", "expected a number");
-        self.error(error.span().unwrap_or(0..0), message.replace("expected u32", "expected a whole number"))
+        let message = IN_SCENES
+            .iter()
+            .fold(error.message().to_owned(), |said, (rust, scene)| said.replace(rust, scene));
+        self.error(error.span().unwrap_or(0..0), message)
     }
 }
+
+/// What the reader says, and what that is to those who write scenes.
+const IN_SCENES: [(&str, &str); 6] = [
+    (" field `", " key `"),
+    (" variant `", " name `"),
+    ("expected f64", "expected a number"),
+    ("expected u32", "expected a whole number"),
+    ("type: map, expected a sequence", "type: one table, expected a list of tables, each headed [[...]]"),
+    ("expected a sequence", "expected a list, written [...]"),
+];
 
 /// The override as a TOML document; else what is wrong with it.
 fn override_as_toml(written: &str) -> std::result::Result<String, String> {
