@@ -15,7 +15,6 @@
 
 layout(location = 1) flat in uint picture;
 
-const uint AT_A_TIME = 3; // samples, before other pixels' rays go on: see march.glsl
 
 void main() {
     LightPicture light = light_pictures[picture];
@@ -38,7 +37,7 @@ void main() {
     while (!walker.strays && passes < MOST_PASSES) {
         if (stretch.first >= stretch.steps.count) stretch = go_on(walker, ray.along, ray.farthest, passes);
         Steps steps = stretch.steps;
-        uint taken = 0;
+        uint taken = 0; // before other pixels' rays go on: see march.glsl
         // It has two ends: see `march_midpoints`.
         for (; stretch.first < steps.count || even_waits();) {
             Part part = next_part(steps, stretch.first);
@@ -49,8 +48,9 @@ void main() {
             dim(part.begin, part.size, extinction(texel) * max(part.size * per_depth, LEAST));
             passes += PASSES_A_SAMPLE;
             stretch.first = seek(stretch.path, steps, stretch.first, passes);
-            if (stretch.first >= steps.count || ++taken == AT_A_TIME || is_dark()) break;
+            if (stretch.first >= steps.count || ++taken == TOGETHER || is_dark()) break;
         }
+        place();
         if ((walker.is_done && stretch.first >= steps.count && !even_waits()) || is_dark()) break;
     }
     if (is_left || walker.strays || passes >= MOST_PASSES) discard;

@@ -62,19 +62,25 @@ bool follow(vec3 origin, vec3 ray, bool samples, out uint need) {
             // In a gap there are no steps. Looks are fewer than the passes that were counted for the steps.
             bool is_alone = present == 1;
             uint looks = 0;
+            // Loops have two ends: see `march_midpoints`.
             for (uint i = is_alone ? seek(path, steps, 0, looks) : 0; i < steps.count;) {
-                float at = middle(steps, i);
-                float of_step = 0.0;
-                if (is_alone) {
-                    of_step = extinction(fetch(path, at));
-                } else {
-                    for (uint hit = first; hit < end; hit++) {
-                        if (spans[hit].y <= z) continue;
-                        of_step += extinction(fetch(path_from(cells[hits[hit]].texture, origin, ray, light.pixel, is_parallel), at));
+                for (uint taken = 0; i < steps.count;) {
+                    float at = middle(steps, i);
+                    float of_step = 0.0;
+                    if (is_alone) {
+                        of_step = extinction(fetch(path, at));
+                    } else {
+                        for (uint hit = first; hit < end; hit++) {
+                            if (spans[hit].y <= z) continue;
+                            of_step += extinction(fetch(path_from(cells[hits[hit]].texture, origin, ray, light.pixel, is_parallel), at));
+                        }
                     }
+                    dim(z + float(i) * steps.size, steps.size, of_step * max(steps.size * per_depth, LEAST));
+                    i = is_alone ? seek(path, steps, i + 1, looks) : i + 1;
+                    if (i >= steps.count || ++taken == TOGETHER) break;
                 }
-                dim(z + float(i) * steps.size, steps.size, of_step * max(steps.size * per_depth, LEAST));
-                i = is_alone ? seek(path, steps, i + 1, looks) : i + 1;
+                place();
+                if (i >= steps.count) break;
             }
             z = next;
         }

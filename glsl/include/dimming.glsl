@@ -16,15 +16,52 @@ const float LEAST = 1e-30;
 // Passes through loops that lavapipe makes for a sample: those over samples and over knots.
 const uint PASSES_A_SAMPLE = 3;
 
+// Samples whose knots are placed together, which takes hardly more than for one of them.
+const uint TOGETHER = 3;
+
 float knots[KNOTS];
 uint placed = 0;
 float growth = LEAST_GROWTH;
 uint doublings = 0; // of the growth
 float all_but_dark = 3.0e38; // the depth at which LEFT is left
 
-// Where in a step of an optical depth, after another one, that one is reached.
-float reach(float wanted, float before, float optical, float from, float step) {
-    return from + step * clamp((wanted - before) / optical, 0.0, 1.0);
+float optical_so_far = 0.0;
+float dimmed_until = 0.0; // the depth after which nothing was
+
+// Steps whose knots are not placed yet: where they begin, how long they are, and their optical depth; and that of all before them.
+struct Step {
+    float from;
+    float size;
+    float optical;
+};
+
+Step waiting[TOGETHER];
+uint waits = 0; // so many
+float optical_before = 0.0;
+
+// Goes through a step at depth `from` that has this optical depth. After at most TOGETHER steps `place` must be called.
+void dim(float from, float size, float optical) {
+    if (!(optical > 0.0)) return;
+    for (uint i = 0; i < TOGETHER; i++) {
+        if (i == waits) waiting[i] = Step(from, size, optical);
+    }
+    waits++;
+    optical_so_far += optical;
+    dimmed_until = from + size;
+}
+
+// The depth in the steps that wait at which this optical depth is reached.
+float reach(float wanted) {
+    float before = optical_before;
+    float depth = 0.0;
+    bool is_found = false;
+    for (uint i = 0; i < TOGETHER; i++) {
+        float part = clamp((wanted - before) / waiting[i].optical, 0.0, 1.0);
+        if (i < waits && !is_found) depth = waiting[i].from + waiting[i].size * part;
+        before += waiting[i].optical;
+        is_found = is_found || wanted <= before;
+    }
+    return depth;
 }
 
 // Leaves out every other knot.
@@ -35,28 +72,18 @@ void thin_out() {
     doublings++;
 }
 
-float optical_so_far = 0.0;
-float dimmed_until = 0.0; // the depth after which nothing was
-
-// Places the knots that are reached in a step at depth `from`.
-void place(float from, float step, float optical) {
-    float before = optical_so_far;
-    float now = before + optical;
-    float grown = min(opacity(now), 1.0);
+// Places the knots that are reached in the steps that wait.
+void place() {
+    if (waits == 0) return;
+    float grown = min(opacity(optical_so_far), 1.0);
     while (grown >= growth * float(KNOTS)) thin_out();
     for (; float(placed) * growth <= grown && placed < KNOTS; placed++) {
-        knots[placed] = reach(optical_depth(float(placed) * growth), before, optical, from, step);
+        knots[placed] = reach(optical_depth(float(placed) * growth));
     }
     float nearly = optical_depth(1.0 - LEFT / float(GROWTHS));
-    if (now >= nearly && all_but_dark >= 3.0e38) all_but_dark = reach(nearly, before, optical, from, step);
-}
-
-// Goes through a step at depth `from` that has this optical depth.
-void dim(float from, float step, float optical) {
-    if (!(optical > 0.0)) return;
-    place(from, step, optical);
-    optical_so_far += optical;
-    dimmed_until = from + step;
+    if (optical_so_far >= nearly && all_but_dark >= 3.0e38) all_but_dark = reach(nearly);
+    optical_before = optical_so_far;
+    waits = 0;
 }
 
 bool is_dark() {
