@@ -69,25 +69,21 @@ Shown look_for(uint first, vec3 point, bool is_parallel) {
 
 // A surface may slant, or be cut aslant: of the pixels around a point on it half show it nearer to the light, and the point would be in
 // its own shadow. So along a pixel's ray the depth beneath the surface is what counts, where the four see one: it is flat, to half of a
-// pixel, and not much farther than two pixels above the point. Where it is steep, in pixels a pixel, it may be two, with an edge between
-// them: then no point counts as deeper than it is, so that what lies behind the edge is not in its own shadow. A pixel's surface is where a
-// quarter to a half of its opacity is reached: where its medium begins is told by where a step of the light's ray does.
+// pixel, not too steep, in pixels a pixel, and not much farther than two pixels above the point. A pixel's surface is where a quarter to a
+// half of its opacity is reached: where its medium begins is told by where a step of the light's ray does.
 const float BUMPIEST = 0.5;
-const float STEEP = 4.0;
+const float STEEPEST = 4.0;
 const float NEAR_SURFACE = 2.0;
-const float ROUNDED = 4.8e-7; // four times EPSILON: by so many parts of the image's side the place of a point in it may be off
 
-// What the slant adds to a point's depth in each of the four pixels around it: `surfaces` are the depths of those in them, and `surface`
-// is their mean at the point, whose place in the image, `side` pixels wide, is rounded.
-vec4 slant_at(vec4 surfaces, float surface, float depth, float pixel, float side) {
+// How much the slant counts for a point at a depth, 0 to 1: `surfaces` are the depths of those in the four pixels around it, and `surface`
+// is their mean at the point. So much of the difference of the two is added to the point's depth in each pixel.
+float slant_at(vec4 surfaces, float surface, float depth, float pixel) {
     float least = min(min(surfaces.x, surfaces.y), min(surfaces.z, surfaces.w));
     float most = max(max(surfaces.x, surfaces.y), max(surfaces.z, surfaces.w));
     float bump = abs(surfaces.x - surfaces.y - surfaces.z + surfaces.w);
     // Where there is nothing it is at 0.
-    bool is_one = least > 0.0 && bump < BUMPIEST * pixel;
-    float nearness = is_one ? clamp(2.0 - (depth - surface) / (NEAR_SURFACE * pixel), 0.0, 1.0) : 0.0;
-    float most_added = most - least < STEEP * pixel ? 3.0e38 : 0.0;
-    return min(nearness * (surfaces - surface - ROUNDED * side * (most - least)), most_added);
+    bool is_one = least > 0.0 && most - least < STEEPEST * pixel && bump < BUMPIEST * pixel;
+    return is_one ? clamp(2.0 - (depth - surface) / (NEAR_SURFACE * pixel), 0.0, 1.0) : 0.0;
 }
 
 // The part of the light that reaches a point which is shown there.
@@ -95,8 +91,7 @@ float let_through(Shown shown, bool is_parallel) {
     vec3 place = shown.place;
     vec2 low = floor(shown.corner);
     vec2 part = shown.corner - low;
-    vec2 image = vec2(textureSize(curves, 0).xy);
-    vec2 pixel = 1.0 / image;
+    vec2 pixel = 1.0 / vec2(textureSize(curves, 0).xy);
     vec2 places[4];
     Curve around[4];
     vec4 surfaces;
@@ -110,11 +105,11 @@ float let_through(Shown shown, bool is_parallel) {
     }
     vec2 rows = mix(surfaces.xz, surfaces.yw, part.x);
     float surface = mix(rows.x, rows.y, part.y);
-    vec4 slant = slant_at(surfaces, surface, place.z, shown.pixel, image.x);
+    float slant = slant_at(surfaces, surface, place.z, shown.pixel);
     float sum = 0.0;
     for (int j = 0; j < 4; j++) {
         vec2 weights = mix(1.0 - part, part, vec2(j & 1, j >> 1));
-        float through = transmittance_until(around[j], places[j], place.z + slant[j]);
+        float through = transmittance_until(around[j], places[j], place.z + slant * (surfaces[j] - surface));
 #ifdef SOLIDS
         vec4 blocker = textureLod(blockers, places[j], 0.0);
         if (blocker.w > 0.0 && place.z > blocker_depth(blocker.xyz, place.xy, is_parallel)) through = 0.0;
