@@ -37,7 +37,7 @@ void main() {
     while (!walker.strays && passes < MOST_PASSES) {
         if (stretch.first >= stretch.steps.count) stretch = go_on(walker, ray.along, ray.farthest, passes);
         Steps steps = stretch.steps;
-        uint taken = 0; // before other pixels' rays go on: see march.glsl
+        uint taken = 0; // samples, before other pixels' rays go on: see march.glsl
         // It has two ends: see `march_midpoints`.
         for (; stretch.first < steps.count || even_waits();) {
             Part part = next_part(steps, stretch.first);
@@ -48,7 +48,7 @@ void main() {
             dim(part.begin, part.size, extinction(texel) * max(part.size * per_depth, LEAST));
             passes += PASSES_A_SAMPLE;
             stretch.first = seek(stretch.path, steps, stretch.first, passes);
-            if (stretch.first >= steps.count || ++taken == TOGETHER || is_dark()) break;
+            if (stretch.first >= steps.count || ++taken == SAMPLES_TOGETHER || is_dark()) break;
         }
         place();
         if ((walker.is_done && stretch.first >= steps.count && !even_waits()) || is_dark()) break;

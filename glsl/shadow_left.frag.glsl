@@ -54,7 +54,8 @@ bool follow(vec3 origin, vec3 ray, bool samples, out uint need) {
                 if (alone.count > steps.count) steps = alone;
                 present++;
             }
-            uint a_step = AT_ONCE * (end - first + 2);
+            // Of what overlaps, that over samples and that over members, once more than there are members; and those that place knots.
+            uint a_step = AT_ONCE * (end - first + (present == 1 ? 2 : 3));
             need += a_step * steps.count;
             if (!samples) steps.count = 0;
             passes += a_step * (steps.count + 3);
@@ -77,7 +78,7 @@ bool follow(vec3 origin, vec3 ray, bool samples, out uint need) {
                     }
                     dim(z + float(i) * steps.size, steps.size, of_step * max(steps.size * per_depth, LEAST));
                     i = is_alone ? seek(path, steps, i + 1, looks) : i + 1;
-                    if (i >= steps.count || ++taken == TOGETHER) break;
+                    if (i >= steps.count || ++taken == SAMPLES_TOGETHER) break;
                 }
                 place();
                 if (i >= steps.count) break;

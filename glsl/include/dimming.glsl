@@ -13,11 +13,12 @@ const float LEFT = 0.125;
 // Shorter steps than any; keeps an infinite extinction times nothing from being no number.
 const float LEAST = 1e-30;
 
-// Passes through loops that lavapipe makes for a sample: those over samples and over knots.
+// Passes through loops that lavapipe makes for a sample, at most: those over samples and, where knots are placed for each, over knots. Loops
+// over steps that wait are none, since there are as many whatever the sample.
 const uint PASSES_A_SAMPLE = 3;
 
 // Samples whose knots are placed together, which takes hardly more than for one of them.
-const uint TOGETHER = 3;
+const uint SAMPLES_TOGETHER = 3;
 
 float knots[KNOTS];
 uint placed = 0;
@@ -35,14 +36,15 @@ struct Step {
     float optical;
 };
 
-Step waiting[TOGETHER];
+Step waiting[SAMPLES_TOGETHER] = Step[](Step(0.0, 0.0, 1.0), Step(0.0, 0.0, 1.0), Step(0.0, 0.0, 1.0));
 uint waits = 0; // so many
 float optical_before = 0.0;
 
-// Goes through a step at depth `from` that has this optical depth. After at most TOGETHER steps `place` must be called.
+// Goes through a step at depth `from` that has this optical depth, whose knots wait. After SAMPLES_TOGETHER steps, or fewer, `place` must
+// be called.
 void dim(float from, float size, float optical) {
     if (!(optical > 0.0)) return;
-    for (uint i = 0; i < TOGETHER; i++) {
+    for (uint i = 0; i < SAMPLES_TOGETHER; i++) {
         if (i == waits) waiting[i] = Step(from, size, optical);
     }
     waits++;
@@ -55,7 +57,7 @@ float reach(float wanted) {
     float before = optical_before;
     float depth = 0.0;
     bool is_found = false;
-    for (uint i = 0; i < TOGETHER; i++) {
+    for (uint i = 0; i < SAMPLES_TOGETHER; i++) {
         float part = clamp((wanted - before) / waiting[i].optical, 0.0, 1.0);
         if (i < waits && !is_found) depth = waiting[i].from + waiting[i].size * part;
         before += waiting[i].optical;

@@ -202,7 +202,7 @@ recipe = "fog.toml"
         ["[march]\nplan = 'papr'", "'papr'", "`default`, `paper`, `exact`"],
         ["[march]\nsamples = 0", "0", "from 1 to 4096"],
         ["[march]\nno_skip = 'levels'", "'levels'", "expected a list, written [...]"],
-        ["[light.sun]\ndirection = [0, -1, 0]", "light", "expected a list of tables, each headed [[...]]"],
+        ["[light.sun]\ndirection = [0, -1, 0]", "light", "of tables, each headed [[...]]"],
         ["[march]\nstep = 0", "0", "from 0.001"],
         ["[camera]\neye = [0, 0, 1]", "[camera]", "missing key `target`"],
         ["[camera]\neye = [1, 2, 3]\ntarget = [1, 2, 3.0]", "[1, 2, 3.0]", "other than the eye"],

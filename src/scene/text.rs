@@ -167,13 +167,12 @@ impl Text {
 }
 
 /// What the reader says, and what that is to those who write scenes.
-const IN_SCENES: [(&str, &str); 6] = [
+const IN_SCENES: [(&str, &str); 5] = [
     (" field `", " key `"),
     (" variant `", " name `"),
     ("expected f64", "expected a number"),
     ("expected u32", "expected a whole number"),
-    ("type: map, expected a sequence", "type: one table, expected a list of tables, each headed [[...]]"),
-    ("expected a sequence", "expected a list, written [...]"),
+    ("expected a sequence", "expected a list, written [...] or, of tables, each headed [[...]]"),
 ];
 
 /// The override as a TOML document; else what is wrong with it.

@@ -28,7 +28,7 @@ impl<const SIDES: usize> Passage<SIDES> {
     /// Through nothing.
     pub const NOTHING: Self = Self { depth: 0.0, opacity: 0.0, light: [[0.0; 3]; SIDES] };
 
-    /// Through a texel that is so deep.
+    /// Through a texel of this optical depth.
     #[inline(always)]
     pub fn through(texel: [f64; 4], depth: f64) -> Self {
         let [red, green, blue, alpha] = texel;
@@ -40,7 +40,7 @@ impl<const SIDES: usize> Passage<SIDES> {
         Self::of(depth, opacity(depth), [straight; SIDES])
     }
 
-    /// Through what is of one colour, seen from each side, throughout: so deep, which is so opaque, and with so much light for its
+    /// Through what is of one colour, seen from each side, throughout: its optical depth, the opacity that this is, and its light for its
     /// opacity.
     #[inline(always)]
     pub fn of(depth: f64, opacity: f64, straight: [[f64; 3]; SIDES]) -> Self {

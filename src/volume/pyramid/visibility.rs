@@ -59,12 +59,15 @@ impl Visibility {
 
 #[cfg(test)]
 mod tests {
+    use super::super::medium::depths;
     use super::*;
+    use crate::volume::Volume;
 
     #[test]
     fn what_lies_above_hides() {
-        let depths = [0.5, 0.0, 0.5, 1.0, 0.25, 0.0].map(|alpha: f64| -(-alpha).ln_1p());
-        let visibility = Visibility::from_above([2, 1, 3], &depths, 0.5);
+        let texels = [0.5, 0.0, 0.5, 1.0, 0.25, 0.0].map(|alpha| [0.0, 0.0, 0.0, alpha]);
+        let volume = Volume::new([2, 1, 3], texels.to_vec()).unwrap();
+        let visibility = Visibility::from_above(volume.size, &depths(&volume), 0.5);
         // From the top: a quarter, then half of the light is stopped, of a slanted ray through half an opacity distance.
         let left = [0.75_f64.sqrt(), 0.75 * 0.5_f64.sqrt(), 0.75 * 0.5 * 0.5_f64.sqrt()];
         for (w, expected) in [(2, left[0]), (1, left[1]), (0, left[2])] {
