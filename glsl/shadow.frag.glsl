@@ -15,7 +15,6 @@
 
 layout(location = 1) flat in uint picture;
 
-
 void main() {
     LightPicture light = light_pictures[picture];
     int next;

@@ -54,7 +54,8 @@ bool follow(vec3 origin, vec3 ray, bool samples, out uint need) {
                 if (alone.count > steps.count) steps = alone;
                 present++;
             }
-            // Of what overlaps, that over samples and that over members, once more than there are members; and those that place knots.
+            // Of a step: one over samples, one more over members than there are, and those that place knots; where there are none but
+            // one, members are not gone through, and what is counted for them is enough for the knots.
             uint a_step = AT_ONCE * (end - first + (present == 1 ? 2 : 3));
             need += a_step * steps.count;
             if (!samples) steps.count = 0;

@@ -54,7 +54,7 @@ impl<const SIDES: usize> Columns<SIDES> {
                 whole = whole.under(through(place, part));
             }
             let straight = whole.straight().map(|colour| colour.map(stored));
-            Piece { depth: whole.depth, opacity: whole.opacity(), straight }
+            Piece { depth: whole.depth, opacity: whole.opacity, straight }
         });
         Self { size, axis, pieces }
     }

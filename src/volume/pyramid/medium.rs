@@ -18,7 +18,7 @@ pub struct Passage<const SIDES: usize = 1> {
     /// Optical depth; infinite behind a wall.
     pub depth: f64,
     /// `1 - exp(-depth)`.
-    opacity: f64,
+    pub opacity: f64,
     /// Red, green and blue that come out: at the lower end, of two sides, and at the upper one.
     light: [[f64; 3]; SIDES],
 }
@@ -45,11 +45,6 @@ impl<const SIDES: usize> Passage<SIDES> {
     #[inline(always)]
     pub fn of(depth: f64, opacity: f64, straight: [[f64; 3]; SIDES]) -> Self {
         Self { depth, opacity, light: straight.map(|colour| colour.map(|colour| colour * opacity)) }
-    }
-
-    /// The part of the light that does not pass.
-    pub fn opacity(&self) -> f64 {
-        self.opacity
     }
 
     /// Its light for its opacity, seen from each side.
