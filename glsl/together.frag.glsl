@@ -72,6 +72,7 @@ void main() {
     float farthest = FAR;
 #endif
     Light light = Light(Gathered(vec4(0.0), vec4(0.0)), 0.0);
+    Light before = light; // before the stretch that was looked at last
     uint passes = 0;
     if (is_begun) {
         // Any of the parts that it leaves may be one that it begins in: as many as it leaves more often than it enters.
@@ -109,6 +110,7 @@ void main() {
             begin = stop;
             steps = 0;
             step_index = 0;
+            before = light;
             uint i = 0;
             while (i < walkers) {
                 if (ends[i] <= begin) {
@@ -229,10 +231,11 @@ void main() {
             light.depth += transmittance(light.gathered) * mixed.a * z;
             lay_behind(light.gathered, mixed);
             passes += PASSES_A_SAMPLE;
-            if (++taken == SHARES_AT_A_TIME || (step_index == steps && !even_waits()) || transmittance(light.gathered) <= SATURATED) break;
+            if (++taken == SHARES_AT_A_TIME || (step_index == steps && !even_waits()) || is_saturated(light)) break;
         }
-        if ((is_done && !even_waits()) || transmittance(light.gathered) <= SATURATED) break;
+        if ((is_done && !even_waits()) || is_saturated(light)) break;
     }
+    fill_up(light, before, last_end);
     is_left = is_left || passes >= MOST_PASSES;
     out_rgba = is_left ? vec4(uintBitsToFloat(0x7f800000u)) : light.gathered.rgba;
 #ifdef DEPTH

@@ -38,6 +38,7 @@ void main() {
     float farthest = FAR;
 #endif
     Light light = Light(Gathered(vec4(0.0), vec4(0.0)), 0.0);
+    Light before = light; // before the stretch that was looked at last
     uint passes = 0;
     Walker walker = walker_at(next, last, is_begun, ray, passes);
 #ifdef FEW_AT_A_TIME
@@ -45,9 +46,13 @@ void main() {
 #endif
     while (!walker.strays && passes < MOST_PASSES) {
 #ifdef FEW_AT_A_TIME
-        if (stretch.first >= stretch.steps.count) stretch = go_on(walker, ray, farthest, passes);
+        if (stretch.first >= stretch.steps.count) {
+            stretch = go_on(walker, ray, farthest, passes);
+            before = light;
+        }
 #else
         Stretch stretch = go_on(walker, ray, farthest, passes);
+        before = light;
 #endif
         bool is_passed = true;
         if (stretch.first < stretch.steps.count || even_waits()) {
@@ -61,8 +66,9 @@ void main() {
             is_passed = i >= stretch.steps.count;
 #endif
         }
-        if ((walker.is_done && is_passed && !even_waits()) || transmittance(light.gathered) <= SATURATED) break;
+        if ((walker.is_done && is_passed && !even_waits()) || is_saturated(light)) break;
     }
+    fill_up(light, before, last_end);
     bool is_left = walker.strays || passes >= MOST_PASSES;
     out_rgba = is_left ? vec4(uintBitsToFloat(0x7f800000u)) : light.gathered.rgba;
 #ifdef DEPTH

@@ -38,7 +38,9 @@ fn choose(name: &str, errors: &[f64]) -> Vec<(Trial, f64)> {
         let (first, again) = (choose(), choose());
         assert_eq!((first.trial, 0), (again.trial, again.measured), "what is known was measured again");
         let picture = |march| {
-            let scene = Arc::new(Scene { march, ..scene.clone() });
+            let mut scene = scene.clone();
+            first.apply(&mut scene);
+            let scene = Arc::new(Scene { march, ..scene });
             Watched::prepare("shell", &scene).render(&scene.view).image
         };
         let rmse = |march| metric::compare(&picture(march), &reference).unwrap().rmse;
@@ -80,6 +82,22 @@ fn fog_torus() {
 #[test]
 fn weave_teapot() {
     uses_what_is_accepted("weave-teapot");
+}
+
+#[test]
+fn rays_end_where_the_scene_says_unless_that_is_too_much() {
+    let scene = load("fur-sphere", 32);
+    let progress: Arc<dyn Progress> = Arc::new(Silent);
+    let (device, interrupt) = (DeviceChoice::Any, Interrupt::default());
+    let setup = Setup { device: &device, validation: None, progress: &progress, interrupt: &interrupt };
+    let kept = |end_below, max_error| {
+        let mut scene = Scene { end_below, ..scene.clone() };
+        pilot::choose(&scene, max_error, &METHODS[0], None, &setup).unwrap().apply(&mut scene);
+        scene.end_below
+    };
+    assert_eq!(kept(3e-3, 1e-2), 3e-3);
+    assert_eq!(kept(4e-3, 1e-2), scene::END_BELOW);
+    assert_eq!(kept(0.0, 1e-2), 0.0);
 }
 
 #[test]

@@ -9,6 +9,20 @@ struct Light {
 // Below this an alpha counts as none: quotients of denormal numbers are not numbers where they are flushed to zero.
 const float LEAST = 1e-30;
 
+// Whether so little is let through that the rest is not looked at.
+bool is_saturated(Light light) {
+    return transmittance(light.gathered) <= SATURATED;
+}
+
+// Of a ray that ends there: what is behind is taken for more of what came since `before`, and lies where that ended: it is nearer to that
+// than to nothing.
+void fill_up(inout Light light, Light before, float end) {
+    vec4 since = max(light.gathered.rgba - before.gathered.rgba, vec4(0.0));
+    if (!is_saturated(light) || since.a == 0.0) return;
+    light.depth += transmittance(light.gathered) * end;
+    lay_behind(light.gathered, since / since.a);
+}
+
 #ifdef LIT
 #include "shade.glsl"
 #else
@@ -102,7 +116,7 @@ void march_midpoints(Path path, Steps steps, inout uint i, float per_depth, inou
         i = seek(path, steps, i, passes);
 #if defined(FEW_AT_A_TIME)
         taken++;
-        if (i >= steps.count || taken == AT_A_TIME || transmittance(light.gathered) <= SATURATED) break;
+        if (i >= steps.count || taken == AT_A_TIME || is_saturated(light)) break;
 #elif defined(WALKS)
         if (i >= steps.count) break;
 #else

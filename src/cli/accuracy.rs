@@ -84,9 +84,9 @@ pub struct Choice {
 }
 
 impl Choice {
-    /// By which the picture is to be rendered.
-    pub fn march(&self) -> March {
-        self.choice.trial.march
+    /// The scene as it is to be rendered.
+    pub fn apply(&self, scene: &mut Scene) {
+        self.choice.apply(scene);
     }
 
     /// What came of it: verified, if that was asked for.
@@ -96,7 +96,7 @@ impl Choice {
     pub fn accuracy(self, scene: &Scene, image: &Image, setup: &Setup<'_>) -> Result<Accuracy> {
         let Self {
             max_error,
-            choice: pilot::Choice { trial: Trial { march, error }, measured },
+            choice: pilot::Choice { trial: Trial { march, error }, measured, .. },
             verify,
             cache,
             warning: _,

@@ -185,7 +185,7 @@ fn render(arguments: &Arguments, line: &Arc<Line>, interrupt: &Interrupt, talk: 
     let choice = arguments.accuracy.choose(&loaded, entry, &setup)?;
     let warning = choice.as_ref().and_then(|choice| choice.warning.clone());
     if let Some(choice) = &choice {
-        loaded.march = choice.march();
+        choice.apply(&mut loaded);
         watch.lap("pilot");
     }
     let loaded = Arc::new(loaded);

@@ -21,7 +21,7 @@ use crate::gpu::{Gpu, shaders};
 use crate::method::{Entry, Setup};
 use crate::progress::{Progress, Silent};
 use crate::reference::Reference;
-use crate::scene::{March, Scene};
+use crate::scene::{END_BELOW, March, Scene};
 use crate::{Error, Result};
 
 /// What feeds the shaders.
@@ -52,10 +52,22 @@ pub struct Choice {
     pub trial: Trial,
     /// How many marches were measured for it now; the others were known.
     pub measured: usize,
+    /// The scene's [`Scene::end_below`], or the default where that alone might take too much of the error.
+    end_below: f64,
 }
 
+impl Choice {
+    /// The scene as it is to be rendered.
+    pub fn apply(&self, scene: &mut Scene) {
+        (scene.march, scene.end_below) = (self.trial.march, self.end_below);
+    }
+}
+
+/// The part of the error accepted above which a scene's `end_below` is not kept.
+const MOST_ENDED: f64 = 1.0 / 3.0;
+
 /// The coarsest march by which `method` renders the scene's own view with an RMSE (linear premultiplied RGBA, all pixels) of at
-/// most `max_error`; `scene.march` is not read. Known trials are taken from `cache`, a folder, and kept there.
+/// most `max_error`; `scene.march` is not read, and `scene.end_below` is the default where it is above a third of that. Known trials are taken from `cache`, a folder, and kept there.
 ///
 /// # Errors
 /// [`Error::Usage`] where no march meets the error; as [`Method::render`](crate::method::Method::render); [`Error::Output`]
@@ -67,12 +79,15 @@ pub fn choose(
     cache: Option<&Path>,
     setup: &Setup<'_>,
 ) -> Result<Choice> {
+    let end_below =
+        if scene.end_below > MOST_ENDED * max_error { END_BELOW.min(scene.end_below) } else { scene.end_below };
+    let scene = &Scene { end_below, ..scene.clone() };
     let mut trials = Trials::load(cache, fingerprint(scene, method, setup)?);
     let mut sample: Option<Sample> = None;
     let mut measured = 0;
     loop {
         match search::next(trials.all(), max_error) {
-            Next::Done(trial) => return Ok(Choice { trial, measured }),
+            Next::Done(trial) => return Ok(Choice { trial, measured, end_below }),
             Next::Impossible(best) => {
                 return Err(Error::Usage {
                     message: format!(
