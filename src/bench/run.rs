@@ -54,6 +54,7 @@ pub fn run(sweep: &Sweep, options: &Options<'_>, setup: &Setup<'_>) -> Result<Ou
     };
     let overrides = overrides(sweep.size, &sweep.define);
     // What keeps a scene from being drawn, or results from being written, is told before anything is measured.
+    setup.progress.stage("opening the device");
     let opened = opened(sweep, setup)?;
     for path in &sweep.scenes {
         setup.progress.stage(&format!("checking {}", path.display()));

@@ -274,6 +274,7 @@ fn render(arguments: &Arguments, line: &Arc<FrameLine>, interrupt: &Interrupt) -
     let progress: Arc<dyn Progress> = line.clone();
     let setup = Setup { device: &device, validation: messages.as_ref(), progress: &progress, interrupt };
     let entry = method::by_name(&arguments.method).expect("clap lets through the names of the table alone");
+    progress.stage("opening the device");
     let opened = (entry.open)(&setup)?;
     let pictures = match &output {
         Output::Pictures(names) => {

@@ -10,6 +10,7 @@ mod diff;
 mod frames;
 mod gallery;
 mod mesh;
+mod opening;
 mod output;
 mod progress;
 mod render;

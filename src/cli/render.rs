@@ -11,12 +11,13 @@ use mesoshell::frame::{Report, Stage, Stopwatch, file};
 use mesoshell::gpu::{DeviceChoice, Messages};
 use mesoshell::method::{self, Choice, METHODS, Saving, Setup};
 use mesoshell::progress::{Interrupt, Progress};
-use mesoshell::scene::{self, Loaded, Sizes, Skip, View};
+use mesoshell::scene::{Loaded, Skip, View};
 use mesoshell::value::PictureSize;
 use mesoshell::{Error, Result};
 use serde::Serialize;
 
 use super::accuracy::{self, Accuracy};
+use super::opening::open_and_load;
 use super::progress::{Line, listen};
 use super::{Talk, frames, table};
 
@@ -166,17 +167,11 @@ fn render(arguments: &Arguments, line: &Arc<Line>, interrupt: &Interrupt, talk: 
     let device = arguments.device.clone().unwrap_or_default();
     let messages = arguments.validate.then(Messages::default);
     let setup = Setup { device: &device, validation: messages.as_ref(), progress, interrupt };
-    let mut watch = Stopwatch::start();
     let entry = method::by_name(&arguments.method).expect("clap lets through the names of the table alone");
-    let method = (entry.open)(&setup)?;
-    watch.lap("open");
-    let mut stages = watch.finish();
-
     let size = arguments.pixels();
-    let admit = |sizes: &Sizes| method.admit(&Sizes { picture: size.unwrap_or(sizes.picture), ..*sizes });
-    let Loaded { scene: mut loaded, backdrop, stages: load } =
-        scene::load_if(scene, &arguments.overrides(), progress.as_ref(), &admit)?;
-    stages.extend(load);
+    let (method, Loaded { scene: mut loaded, backdrop, mut stages }, waited) =
+        open_and_load(entry, &setup, scene, &arguments.overrides(), size)?;
+    stages.push(waited);
     [loaded.view.width, loaded.view.height] = size.unwrap_or([loaded.view.width, loaded.view.height]);
     let view = loaded.view;
     interrupt.check()?;

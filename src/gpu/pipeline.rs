@@ -5,6 +5,7 @@ use std::marker::PhantomData;
 use std::sync::Arc;
 
 use ash::vk;
+use rayon::prelude::*;
 
 use super::buffer::Buffer;
 use super::device::{Gpu, vulkan_error};
@@ -64,6 +65,27 @@ pub struct PipelineInfo<'a> {
     pub keeps: Keeps,
 }
 
+/// What of a target its pipelines depend on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct TargetKind {
+    format: Rgba,
+    attachments: usize,
+    has_depths: bool,
+    /// Whether any of the pipelines that draw into it reads its pixels.
+    reads_itself: bool,
+}
+
+impl TargetKind {
+    fn of(target: &Target) -> Self {
+        Self {
+            format: target.format,
+            attachments: target.attachments(),
+            has_depths: target.depth.is_some(),
+            reads_itself: target.reads_itself,
+        }
+    }
+}
+
 /// A graphics pipeline without vertex input: triangles pulled from buffers.
 #[derive(Debug)]
 pub struct Pipeline {
@@ -81,18 +103,34 @@ pub struct Pipeline {
     minified: bool,
     push_constant_bytes: u32,
     /// Of the targets that it draws into.
-    format: Rgba,
-    attachments: usize,
-    /// Whether these have depths.
-    has_depths: bool,
-    /// Whether these read themselves, for any of the pipelines that draw into them.
-    reads_itself: bool,
+    kind: TargetKind,
     gpu: Arc<Gpu>,
     // One thread at a time binds and draws.
     not_shared: PhantomData<Cell<()>>,
 }
 
 impl Pipeline {
+    /// Builds several at once, on several processors, which takes drivers milliseconds each.
+    ///
+    /// # Errors
+    /// As [`Pipeline::new`].
+    ///
+    /// # Panics
+    /// As [`Pipeline::new`].
+    pub fn all<const N: usize>(
+        gpu: &Arc<Gpu>,
+        target: &Target,
+        infos: [Option<PipelineInfo<'_>>; N],
+    ) -> Result<[Option<Self>; N]> {
+        let (kind, pass) = (TargetKind::of(target), target.clearing);
+        assert!(Arc::ptr_eq(gpu, &target.gpu), "the target is another device's");
+        let build = |info: Option<PipelineInfo<'_>>| {
+            info.map(|info| Self::build(gpu, kind, pass, &info)).transpose()
+        };
+        let pipelines = infos.into_par_iter().map(build).collect::<Result<Vec<_>>>()?;
+        Ok(pipelines.try_into().expect("as many as there were"))
+    }
+
     /// Builds the pipeline for targets like `target`.
     ///
     /// # Errors
@@ -102,6 +140,10 @@ impl Pipeline {
     /// Where the target is another device's, or a number in `info` is out of its range.
     pub fn new(gpu: &Arc<Gpu>, target: &Target, info: &PipelineInfo<'_>) -> Result<Self> {
         assert!(Arc::ptr_eq(gpu, &target.gpu), "the target is another device's");
+        Self::build(gpu, TargetKind::of(target), target.clearing, info)
+    }
+
+    fn build(gpu: &Arc<Gpu>, kind: TargetKind, pass: vk::RenderPass, info: &PipelineInfo<'_>) -> Result<Self> {
         let nearest = info.keeps == Keeps::Nearest;
         let blends = matches!(info.keeps, Keeps::Blend | Keeps::BlendAbove | Keeps::BlendBelow);
         let depths = match info.keeps {
@@ -111,10 +153,9 @@ impl Pipeline {
             Keeps::BlendBelow => Some((vk::CompareOp::LESS, false)),
             Keeps::Blend | Keeps::Last => None,
         };
-        let has_depths = target.depth.is_some();
         let reads_picture = info.keeps == Keeps::MarksByPicture;
-        assert!(depths.is_none() || has_depths, "a target for the other kind of pipeline");
-        assert!(!reads_picture || target.reads_itself, "a target that is not marked by what was drawn");
+        assert!(depths.is_none() || kind.has_depths, "a target for the other kind of pipeline");
+        assert!(!reads_picture || kind.reads_itself, "a target that is not marked by what was drawn");
         assert!((4..=128).contains(&info.push_constant_bytes) && info.push_constant_bytes.is_multiple_of(4));
         // From here on `Drop` cleans up, null handles included.
         let mut pipeline = Self {
@@ -130,10 +171,7 @@ impl Pipeline {
             input_attachments: if reads_picture { vec![PICTURE] } else { Vec::new() },
             minified: info.minified,
             push_constant_bytes: info.push_constant_bytes,
-            format: target.format,
-            attachments: target.attachments(),
-            has_depths,
-            reads_itself: target.reads_itself,
+            kind,
             gpu: gpu.clone(),
             not_shared: PhantomData,
         };
@@ -186,7 +224,7 @@ impl Pipeline {
                     _ => vk::ColorComponentFlags::RGBA,
                 },
             };
-            target.attachments()
+            kind.attachments
         ];
         let blending = vk::PipelineColorBlendStateCreateInfo::default().attachments(&blends);
         let depth = vk::PipelineDepthStencilStateCreateInfo::default()
@@ -206,7 +244,7 @@ impl Pipeline {
             .color_blend_state(&blending)
             .dynamic_state(&dynamic)
             .layout(pipeline.layout)
-            .render_pass(target.clearing);
+            .render_pass(pass);
         // SAFETY: all structures live through the call, and the handles are of this device.
         let created =
             unsafe { gpu.raw.create_graphics_pipelines(vk::PipelineCache::null(), &[create_info], None) };
@@ -276,9 +314,7 @@ impl Pipeline {
             .chain(draw.textures.iter().map(|(_, texture)| texture.gpu()))
             .chain([&draw.target.gpu]);
         assert!(devices.into_iter().all(|gpu| Arc::ptr_eq(gpu, &self.gpu)), "objects of several devices");
-        assert_eq!((draw.target.format, draw.target.attachments()), (self.format, self.attachments));
-        let kind = (draw.target.depth.is_some(), draw.target.reads_itself);
-        assert_eq!(kind, (self.has_depths, self.reads_itself), "a target for the other kind of pipeline");
+        assert_eq!(TargetKind::of(draw.target), self.kind, "a target for the other kind of pipeline");
         for (_, texture) in draw.textures {
             if let Sampled::Picture(picture) = texture {
                 assert!(picture.sampler != vk::Sampler::null(), "a target that shaders cannot read");

@@ -65,7 +65,7 @@ pub struct Choice {
 }
 
 /// A method that has no scene yet, with its device where it needs one.
-pub trait Opened {
+pub trait Opened: Send {
     /// Refuses what the device could not hold: to be asked before the volume is computed, which may take long.
     ///
     /// # Errors

@@ -273,7 +273,6 @@ impl Shell {
                     fragment: shaders::CYCLE_FRAG.with(on),
                     ..info
                 };
-                let cycle = kind.cycles.then(|| Pipeline::new(&self.gpu, &target, &of_cycles));
                 let saturated = PipelineInfo {
                     vertex: shaders::LAYER_VERT.with(&[]),
                     fragment: shaders::SATURATED_FRAG.with(&[]),
@@ -284,11 +283,12 @@ impl Shell {
                     keeps: Keeps::MarksByPicture,
                     ..info
                 };
-                let saturated = looks.then(|| Pipeline::new(&self.gpu, &target, &saturated));
+                let infos = [Some(info), kind.cycles.then_some(of_cycles), looks.then_some(saturated)];
+                let [pipeline, cycle, saturated] = Pipeline::all(&self.gpu, &target, infos)?;
                 let medium = Medium::Sorted {
-                    pipeline: Pipeline::new(&self.gpu, &target, &info)?,
-                    cycle: cycle.transpose()?,
-                    saturated: saturated.transpose()?,
+                    pipeline: pipeline.expect("asked for"),
+                    cycle,
+                    saturated,
                     tiles: Buffer::storage(&self.gpu, "the tiles of cycles", &seen.tiles)?,
                     list: Buffer::storage(&self.gpu, "the tetrahedra in order", &seen.list)?,
                 };
@@ -304,14 +304,12 @@ impl Shell {
                     keeps: Keeps::Marks,
                     ..info
                 };
-                let mark = Pipeline::new(&self.gpu, &target, &mark)?;
                 let walked = PipelineInfo {
                     vertex: shaders::WALK_VERT.with(&[]),
                     fragment: shaders::WALK_FRAG.with(on),
                     keeps: Keeps::BlendAbove,
                     ..info
                 };
-                let pipeline = Pipeline::new(&self.gpu, &target, &walked)?;
                 let mut constants = kind.constants.clone();
                 constants[..3].copy_from_slice(&constants_of_volume(
                     self.scene.march,
@@ -319,18 +317,20 @@ impl Shell {
                     &self.scene.volume,
                 ));
                 let magnified = PipelineInfo { constants: &constants, minified: false, ..walked };
-                let magnified = kind
-                    .partly_magnified
-                    .then(|| Pipeline::new(&self.gpu, &target, &magnified))
-                    .transpose()?;
                 let of_several = PipelineInfo {
                     vertex: shaders::WALK_VERT.with(&["TOGETHER"]),
                     fragment: shaders::TOGETHER_FRAG.with(on),
                     keeps: Keeps::BlendBelow,
                     ..walked
                 };
-                let together = kind.cycles.then(|| Pipeline::new(&self.gpu, &target, &of_several));
-                let together = together.transpose()?;
+                let infos = [
+                    Some(mark),
+                    Some(walked),
+                    kind.partly_magnified.then_some(magnified),
+                    kind.cycles.then_some(of_several),
+                ];
+                let [mark, pipeline, magnified, together] = Pipeline::all(&self.gpu, &target, infos)?;
+                let [mark, pipeline] = [mark, pipeline].map(|pipeline| pipeline.expect("asked for"));
                 let rays = RayBuffers::new(&self.gpu, crossings)?;
                 let cells = Buffer::floats(&self.gpu, "the tetrahedra", &seen.cells)?;
                 (cells, Medium::Walked { mark, pipeline, magnified, together, rays })

@@ -111,8 +111,9 @@ struct Opened {
 /// # Errors
 /// [`Error::Device`] where there is none.
 pub fn open(setup: &Setup<'_>) -> Result<Box<dyn super::Opened>> {
-    setup.progress.stage("opening the device");
     let gpu = Gpu::open(setup.device, setup.validation)?;
+    // Most volumes ask; here it is known before they are loaded.
+    gpu.blends_levels()?;
     Ok(Box::new(Opened { gpu, progress: setup.progress.clone(), interrupt: setup.interrupt.clone() }))
 }
 
