@@ -87,11 +87,11 @@ impl AddAssign for DrawTimes {
 }
 
 /// How long a submission should take: so soon an interrupt is obeyed, and long before a system gives a device up.
-const PATIENCE: Duration = Duration::from_millis(250);
+const PATIENCE: Duration = Duration::from_millis(400);
 /// The first submission of a target's first draw has one of so many parts of all vertices.
 const FIRST_PART: u64 = 16;
 /// The next may be larger than the one before it by this factor.
-const MOST_GROWTH: f64 = 8.0;
+const MOST_GROWTH: f64 = 16.0;
 
 /// Draws, copies a target of the host's to its memory, and waits for all of it. Device times
 /// are `None` where the device has no timestamps.
