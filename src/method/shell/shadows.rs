@@ -325,7 +325,7 @@ impl Shadows {
         // Of these the last is used: whether rays begin in the shell.
         let is_any_inside = self.views.iter().any(|view| !view.is_parallel);
         constants.extend([0, 0, u32::from(is_any_inside)]);
-        let info = PipelineInfo {
+        let walk = PipelineInfo {
             vertex: shaders::TILE_VERT.with(&["LIGHT", "WALKED"]),
             fragment: shaders::SHADOW_FRAG.with(&switches),
             constants: &constants,
@@ -337,17 +337,18 @@ impl Shadows {
             push_constant_bytes: size_of::<ViewConstants>() as u32,
             keeps: Keeps::Nearest,
         };
-        let walk = Pipeline::new(gpu, &self.curves, &info)?;
         // Those that are left leap over nothing but what is empty.
         switches.retain(|&switch| switch != "SPARSE" || volume.is_sparse());
-        let info = PipelineInfo {
+        let left = PipelineInfo {
             vertex: shaders::TILE_VERT.with(&["LIGHT"]),
             fragment: shaders::SHADOW_LEFT_FRAG.with(&switches),
             storage_buffers: &[0, 1, 2, 6],
             texel_buffers: &[],
-            ..info
+            ..walk
         };
-        Ok(CurvePipelines { walk, left: Pipeline::new(gpu, &self.curves, &info)? })
+        let built = Pipeline::all(gpu, &self.curves, [Some(walk), Some(left)])?;
+        let [walk, left] = built.map(|pipeline| pipeline.expect("asked for"));
+        Ok(CurvePipelines { walk, left })
     }
 
     /// Where a picture lies in the image: its upper left corner, in pixels.
