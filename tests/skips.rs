@@ -141,9 +141,15 @@ fn what_is_behind_is_taken_for_what_is_in_front() {
     let volume = Arc::new(Pyramid::build(Volume::new([4; 3], vec![[red, green, blue, alpha]; 64]).unwrap()));
     // Rays that are alone, and in several parts of the shell at once.
     for name in ["fog-torus", "table1/teapot-bust"] {
-        let scene = Scene { volume: volume.clone(), shading: None, solids: [].into(), ..load(name, &["volume.opacity_distance=0.03"]) };
+        let scene = Scene {
+            volume: volume.clone(),
+            shading: None,
+            solids: [].into(),
+            ..load(name, &["volume.opacity_distance=0.03"])
+        };
         let [early, full] = [0.1, 0.0].map(|end_below| {
-            let scene = Arc::new(Scene { end_below, skips: Skips::without(&[Skip::EvenSpace]), ..scene.clone() });
+            let scene =
+                Arc::new(Scene { end_below, skips: Skips::without(&[Skip::EvenSpace]), ..scene.clone() });
             Watched::prepare("shell", &scene).render(&scene.view).image.rgba
         });
         let mut opaque = 0;

@@ -26,6 +26,8 @@ pub struct Subject<'a> {
     pub backdrop: &'a Backdrop,
     /// The points.
     pub settings: &'a [Setting],
+    /// Of the paper's plan, if that is measured with as many as the scene says.
+    pub own_samples: Option<u32>,
     /// Errors are those of one pixel of every square of so many by so many.
     pub error_every: u32,
     /// Timed frames of each point.
@@ -82,7 +84,7 @@ pub fn measure(
     let name = subject.path.file_stem().unwrap_or_default().to_string_lossy();
     let fingerprint = Fingerprint::of_reference(scene, &scene.view, subject.error_every);
     let earlier = earlier.filter(|earlier| {
-        let same = earlier.fingerprint == fingerprint;
+        let same = earlier.fingerprint == fingerprint && earlier.own_samples == subject.own_samples;
         if !same {
             warnings
                 .push(format!("{} has changed: it is measured from the beginning", subject.path.display()));
@@ -134,6 +136,7 @@ pub fn measure(
             fingerprint,
             reference_milliseconds: reference.milliseconds,
             reference_reused: reference.reused,
+            own_samples: subject.own_samples,
             curves: Vec::new(),
             points: points(subject, &contenders, &reference.image)?,
         },

@@ -53,6 +53,9 @@ pub struct SceneResults {
     pub reference_milliseconds: f64,
     /// Whether the reference came from the cache.
     pub reference_reused: bool,
+    /// Samples of the paper's plan, if that was measured with as many as the scene says.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub own_samples: Option<u32>,
     /// One for each method and plan.
     pub curves: Vec<Curve>,
     /// In the order of the sweep's settings.
@@ -277,6 +280,7 @@ pub(crate) mod tests {
             fingerprint: Fingerprint::builder("test").finish(),
             reference_milliseconds: 1234.0,
             reference_reused: true,
+            own_samples: None,
             curves: Vec::new(),
             points: points.collect(),
         };

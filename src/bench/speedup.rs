@@ -40,10 +40,13 @@ impl SceneResults {
 }
 
 impl Results {
-    /// The geometric mean over the scenes of the speed-up over so many samples of the paper's plan; `None` unless every scene has one.
-    pub fn mean_speedup(&self, samples: u32) -> Option<f64> {
-        let ratio =
-            |scene: &SceneResults| scene.speedups().into_iter().find(|one| one.samples == samples)?.ratio;
+    /// The geometric mean over the scenes of the speed-up over so many samples of the paper's plan, or as many as each scene says; `None`
+    /// unless every scene has one.
+    pub fn mean_speedup(&self, samples: Option<u32>) -> Option<f64> {
+        let ratio = |scene: &SceneResults| {
+            let samples = samples.or(scene.own_samples)?;
+            scene.speedups().into_iter().find(|one| one.samples == samples)?.ratio
+        };
         let ratios: Option<Vec<f64>> = self.scenes.iter().map(ratio).collect();
         let ratios = ratios.filter(|ratios| !ratios.is_empty())?;
         Some((ratios.iter().map(|ratio| ratio.ln()).sum::<f64>() / ratios.len() as f64).exp())
@@ -81,12 +84,14 @@ mod tests {
         let one = &found.scenes[0].speedups()[0];
         assert_eq!((one.samples, one.setting.as_ref().unwrap().march), (1, March::Default { step: 1.0 }));
         assert!((one.ratio.unwrap() - 30.5 / 10.5).abs() < 1e-12);
-        assert!((found.mean_speedup(1).unwrap() - 30.5 / 10.5).abs() < 1e-12);
-        assert_eq!(found.mean_speedup(2), None);
+        assert!((found.mean_speedup(Some(1)).unwrap() - 30.5 / 10.5).abs() < 1e-12);
+        assert_eq!((found.mean_speedup(Some(2)), found.mean_speedup(None)), (None, None));
+        found.scenes[0].own_samples = Some(1);
+        assert_eq!(found.mean_speedup(None), found.mean_speedup(Some(1)));
         let paper = found.scenes[0].points.last_mut().unwrap();
         paper.error.insert("rmse".to_owned(), Some(1e-6));
         assert_eq!(found.scenes[0].speedups()[0].ratio, None);
-        assert_eq!(found.mean_speedup(1), None);
+        assert_eq!(found.mean_speedup(Some(1)), None);
     }
 
     #[test]

@@ -29,6 +29,9 @@ pub struct Sweep {
     pub error_every: u32,
     /// What is measured of each scene: every method at every level of quality.
     pub settings: Vec<Setting>,
+    /// And every method by the paper's plan with as many samples as each scene's `march.samples` says.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub paper_of_scene: bool,
     /// Timed frames of each point, at least 1; one more comes first and does not count.
     pub runs: u32,
 }
@@ -50,6 +53,8 @@ pub struct Levels {
     pub steps: Vec<f64>,
     /// [`March::Paper`]: samples in each tetrahedron.
     pub samples: Vec<u32>,
+    /// Whether [`March::Paper`] is measured with as many as each scene says, too.
+    pub paper_of_scene: bool,
     /// Whether [`March::Exact`], which has no levels, is measured too.
     pub exact: bool,
 }
@@ -57,7 +62,8 @@ pub struct Levels {
 impl Default for Levels {
     /// Five steps, each half of the one before; the other plans are left out.
     fn default() -> Self {
-        Self { steps: vec![2.0, 1.0, 0.5, 0.25, 0.125], samples: Vec::new(), exact: false }
+        let steps = vec![2.0, 1.0, 0.5, 0.25, 0.125];
+        Self { steps, samples: Vec::new(), paper_of_scene: false, exact: false }
     }
 }
 
@@ -144,6 +150,8 @@ struct Plans {
     #[serde(default)]
     paper: Vec<Samples>,
     #[serde(default)]
+    paper_of_scene: bool,
+    #[serde(default)]
     exact: bool,
 }
 
@@ -174,6 +182,7 @@ impl Sweep {
             size: None,
             error_every: all_pixels(),
             settings: settings(methods, levels),
+            paper_of_scene: levels.paper_of_scene,
             runs: 3,
         }
     }
@@ -199,6 +208,7 @@ impl Sweep {
         let levels = Levels {
             steps: file.plans.get_ref().default.iter().map(|step| step.0).collect(),
             samples: file.plans.get_ref().paper.iter().map(|samples| samples.0).collect(),
+            paper_of_scene: file.plans.get_ref().paper_of_scene,
             exact: file.plans.get_ref().exact,
         };
         if levels.steps.is_empty() && levels.samples.is_empty() && !levels.exact {
@@ -227,8 +237,24 @@ impl Sweep {
             size: file.size.map(|size| size.0.map(|side| side.0)),
             error_every: file.error_every.0,
             settings: settings(&methods, &levels),
+            paper_of_scene: levels.paper_of_scene,
             runs: file.runs.0,
         })
+    }
+
+    /// What is measured of a scene that says so many samples for the paper's plan.
+    pub fn settings_of(&self, samples: u32) -> Vec<Setting> {
+        let mut settings = self.settings.clone();
+        if self.paper_of_scene {
+            let march = March::Paper { samples };
+            for setting in &self.settings {
+                let own = Setting { method: setting.method.clone(), march };
+                if !settings.contains(&own) {
+                    settings.push(own);
+                }
+            }
+        }
+        settings
     }
 
     /// Of all that makes two sweeps' results comparable point by point: that they are one sweep.
@@ -326,6 +352,22 @@ exact = true
     }
 
     #[test]
+    fn each_scene_may_say_the_papers_samples() {
+        let sweep = parse(&SWEEP.replace("paper = [4]", "paper = [4]\npaper_of_scene = true")).unwrap();
+        let of_paper = |samples| {
+            let settings = sweep.settings_of(samples);
+            let samples = |setting: &Setting| match setting.march {
+                March::Paper { samples } => Some(samples),
+                _ => None,
+            };
+            (settings.len(), settings.iter().filter_map(samples).collect::<Vec<_>>())
+        };
+        assert_eq!(of_paper(4), (4, vec![4]));
+        assert_eq!(of_paper(15), (5, vec![4, 15]));
+        assert_eq!(parse(SWEEP).unwrap().settings_of(15).len(), 4);
+    }
+
+    #[test]
     fn what_is_left_out_has_its_default() {
         let sweep = parse("scenes = ['a.toml']\nplans = { default = [1] }").unwrap();
         assert_eq!((sweep.size, sweep.runs, sweep.error_every, sweep.define.len()), (None, 5, 1, 0));
@@ -348,6 +390,7 @@ exact = true
         ["every = 2", "every = 0", "0", "from 1 to 64"],
         ["runs = 2", "runs = 0", "0", "from 1 to 1000"],
         ["paper = [4]", "papers = [4]", "papers", "unknown key `papers`"],
+        ["paper = [4]", "paper_of_scene = 4", "4", "true or false"],
         ["[4]", "[4, 0]", "0", "from 1 to 4096"],
         ["0.5]", "-0.5]", "-0.5", "from 0.001"],
         ["default = [1, 0.5]\npaper = [4]\nexact = true", "exact = false", "[plans]", "steps under"],

@@ -42,10 +42,8 @@ pub fn open_and_load(
     size: Option<[u32; 2]>,
 ) -> Result<(Box<dyn Opened>, Loaded, Stage)> {
     thread::scope(|scope| {
-        let opening = Opening {
-            thread: Cell::new(Some(scope.spawn(|| (entry.open)(setup)))),
-            opened: OnceCell::new(),
-        };
+        let opening =
+            Opening { thread: Cell::new(Some(scope.spawn(|| (entry.open)(setup)))), opened: OnceCell::new() };
         let asked = Cell::new(None);
         let admit = |sizes: &Sizes| {
             let sizes = Sizes { picture: size.unwrap_or(sizes.picture), ..*sizes };

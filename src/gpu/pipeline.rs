@@ -124,9 +124,8 @@ impl Pipeline {
     ) -> Result<[Option<Self>; N]> {
         let (kind, pass) = (TargetKind::of(target), target.clearing);
         assert!(Arc::ptr_eq(gpu, &target.gpu), "the target is another device's");
-        let build = |info: Option<PipelineInfo<'_>>| {
-            info.map(|info| Self::build(gpu, kind, pass, &info)).transpose()
-        };
+        let build =
+            |info: Option<PipelineInfo<'_>>| info.map(|info| Self::build(gpu, kind, pass, &info)).transpose();
         let pipelines = infos.into_par_iter().map(build).collect::<Result<Vec<_>>>()?;
         Ok(pipelines.try_into().expect("as many as there were"))
     }
@@ -143,7 +142,12 @@ impl Pipeline {
         Self::build(gpu, TargetKind::of(target), target.clearing, info)
     }
 
-    fn build(gpu: &Arc<Gpu>, kind: TargetKind, pass: vk::RenderPass, info: &PipelineInfo<'_>) -> Result<Self> {
+    fn build(
+        gpu: &Arc<Gpu>,
+        kind: TargetKind,
+        pass: vk::RenderPass,
+        info: &PipelineInfo<'_>,
+    ) -> Result<Self> {
         let nearest = info.keeps == Keeps::Nearest;
         let blends = matches!(info.keeps, Keeps::Blend | Keeps::BlendAbove | Keeps::BlendBelow);
         let depths = match info.keeps {

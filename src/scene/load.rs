@@ -14,6 +14,9 @@ use crate::{Error, Result, input};
 pub struct Loaded {
     /// What a method renders.
     pub scene: Scene,
+    /// Samples that the paper's plan takes in a tetrahedron, [`March::Paper`](super::March::Paper), whether the scene is to be rendered by it
+    /// or not.
+    pub samples: u32,
     /// What a picture for people is laid on.
     pub backdrop: Backdrop,
     /// What loading cost.

@@ -373,6 +373,6 @@ impl Parts {
             shell,
             volume,
         };
-        Ok(Loaded { scene, backdrop, stages: stopwatch.finish() })
+        Ok(Loaded { scene, samples: file.march.samples.0, backdrop, stages: stopwatch.finish() })
     }
 }

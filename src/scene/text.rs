@@ -167,11 +167,12 @@ impl Text {
 }
 
 /// What the reader says, and what that is to those who write scenes.
-const IN_SCENES: [(&str, &str); 5] = [
+const IN_SCENES: [(&str, &str); 6] = [
     (" field `", " key `"),
     (" variant `", " name `"),
     ("expected f64", "expected a number"),
     ("expected u32", "expected a whole number"),
+    ("expected a boolean", "expected true or false"),
     ("expected a sequence", "expected a list, written [...] or, of tables, each headed [[...]]"),
 ];
 

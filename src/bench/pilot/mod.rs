@@ -79,8 +79,11 @@ pub fn choose(
     cache: Option<&Path>,
     setup: &Setup<'_>,
 ) -> Result<Choice> {
-    let end_below =
-        if scene.end_below > MOST_ENDED * max_error { END_BELOW.min(scene.end_below) } else { scene.end_below };
+    let end_below = if scene.end_below > MOST_ENDED * max_error {
+        END_BELOW.min(scene.end_below)
+    } else {
+        scene.end_below
+    };
     let scene = &Scene { end_below, ..scene.clone() };
     let mut trials = Trials::load(cache, fingerprint(scene, method, setup)?);
     let mut sample: Option<Sample> = None;
