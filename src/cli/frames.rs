@@ -142,7 +142,7 @@ impl Stage {
             Some((of, loaded)) if of == frame => loaded,
             _ => sequence.at(frame, progress, &admit),
         };
-        let Loaded { mut scene, backdrop, mut stages } = loaded?;
+        let Loaded { mut scene, backdrop, mut stages, .. } = loaded?;
         [scene.view.width, scene.view.height] = size.unwrap_or([scene.view.width, scene.view.height]);
         // Taken, so that the scene before is gone while the next one is made.
         if let Some((last, image, report)) =

@@ -169,7 +169,7 @@ fn render(arguments: &Arguments, line: &Arc<Line>, interrupt: &Interrupt, talk: 
     let setup = Setup { device: &device, validation: messages.as_ref(), progress, interrupt };
     let entry = method::by_name(&arguments.method).expect("clap lets through the names of the table alone");
     let size = arguments.pixels();
-    let (method, Loaded { scene: mut loaded, backdrop, mut stages }, waited) =
+    let (method, Loaded { scene: mut loaded, backdrop, mut stages, .. }, waited) =
         open_and_load(entry, &setup, scene, &arguments.overrides(), size)?;
     stages.push(waited);
     [loaded.view.width, loaded.view.height] = size.unwrap_or([loaded.view.width, loaded.view.height]);
