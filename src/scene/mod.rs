@@ -80,8 +80,8 @@ pub struct Scene {
     pub march: March,
     /// How it goes from tetrahedron to tetrahedron.
     pub traversal: Traversal,
-    /// What part of the light, 0 to 0.1, a ray must let through to go on: by so much a picture may be off, where nothing in it is
-    /// brighter than 1.
+    /// What part of the light, 0 to 0.1, a ray must let through to go on; what is behind is taken for more of what it saw last. By so much a
+    /// picture may be off, where nothing in it is brighter than 1.
     pub end_below: f64,
     /// What it may leave out.
     pub skips: Skips,
