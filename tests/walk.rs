@@ -50,7 +50,7 @@ fn agree_with_the_reference(scene: &Scene, frame: &Frame) {
 #[test]
 fn pictures_are_those_of_sorted_tetrahedra() {
     for (name, overrides) in [
-        ("fur-sphere", &[][..]),
+        ("fur-sphere", &["march.end_below=0"][..]),
         ("fog-torus", &[]),
         ("lit-fur", &[]),
         ("effects/solid", &[]),
