@@ -235,7 +235,12 @@ void main() {
         }
         if ((is_done && !even_waits()) || is_saturated(light)) break;
     }
-    fill_up(light, before, last_end);
+    // Else all of it was looked at: what is behind is no medium.
+    bool goes_on = entry != NOWHERE;
+    for (uint i = 0; i < walkers; i++) {
+        goes_on = goes_on || ends[i] > stop || texelFetch(beyond, int(exits[i])).x != NOWHERE;
+    }
+    if (step_index < steps || even_waits() || (goes_on && stop < farthest)) fill_up(light, before);
     is_left = is_left || passes >= MOST_PASSES;
     out_rgba = is_left ? vec4(uintBitsToFloat(0x7f800000u)) : light.gathered.rgba;
 #ifdef DEPTH

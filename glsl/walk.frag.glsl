@@ -68,7 +68,12 @@ void main() {
         }
         if ((walker.is_done && is_passed && !even_waits()) || is_saturated(light)) break;
     }
-    fill_up(light, before, last_end);
+    // Else all of it was looked at: what is behind is no medium.
+    bool is_cut = !walker.is_done && (walker.place != NOWHERE || walker.next != walker.last);
+#ifdef FEW_AT_A_TIME
+    is_cut = is_cut || stretch.first < stretch.steps.count;
+#endif
+    if (is_cut || even_waits()) fill_up(light, before);
     bool is_left = walker.strays || passes >= MOST_PASSES;
     out_rgba = is_left ? vec4(uintBitsToFloat(0x7f800000u)) : light.gathered.rgba;
 #ifdef DEPTH

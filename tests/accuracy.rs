@@ -47,7 +47,7 @@ fn default_quality(name: &str) {
 
 /// Halving the step at least halves the error, until 2e-4.
 fn converges(name: &str) {
-    let scene = load(name, &["image.size=[192, 192]"]);
+    let scene = load(name, &["image.size=[192, 192]", "march.end_below=0"]);
     let steps = [2.0, 1.0, 0.5, 0.25, 0.125];
     let errors: Vec<f64> = compare(&scene, &steps).iter().map(|metrics| metrics.rmse).collect();
     println!("{name}: {errors:?}");

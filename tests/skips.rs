@@ -6,12 +6,13 @@ use std::path::Path;
 use std::sync::Arc;
 
 use common::Watched;
+use glam::DVec3;
 use mesoshell::frame::Frame;
 use mesoshell::method::Choice;
 use mesoshell::metric;
 use mesoshell::progress::Silent;
 use mesoshell::scene::{self, Light, March, Scene, Shading, Skip, Skips, Traversal};
-use mesoshell::volume::{Pyramid, Volume};
+use mesoshell::volume::{Directions, Pyramid, Volume};
 
 fn load(name: &str, overrides: &[&str]) -> Scene {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(name).with_extension("toml");
@@ -133,37 +134,98 @@ fn what_is_behind_the_opaque_does_not_count() {
     assert!(metric::compare(&with.0.image, &without.0.image).unwrap().max <= 2e-6);
 }
 
+/// A volume of one colour and one opacity, a half.
+fn uniform([red, green, blue]: [f32; 3]) -> Volume {
+    Volume::new([4; 3], vec![[0.5 * red, 0.5 * green, 0.5 * blue, 0.5]; 64]).unwrap()
+}
+
+/// Whose rays end where a tenth is let through, and which go on.
+fn early_and_full(scene: &Scene) -> [Frame; 2] {
+    [0.1, 0.0].map(|end_below| {
+        let scene = Arc::new(Scene { end_below, ..scene.clone() });
+        Watched::prepare("shell", &scene).render(&scene.view)
+    })
+}
+
+/// The largest difference of a channel.
+fn off(early: &[f32; 4], full: &[f32; 4]) -> f32 {
+    (0..4).map(|i| (early[i] - full[i]).abs()).fold(0.0, f32::max)
+}
+
 #[test]
 fn what_is_behind_is_taken_for_what_is_in_front() {
-    let colour = [0.8, 0.4, 0.2];
-    let alpha = 0.5;
-    let [red, green, blue] = colour.map(|channel| alpha * channel);
-    let volume = Arc::new(Pyramid::build(Volume::new([4; 3], vec![[red, green, blue, alpha]; 64]).unwrap()));
+    let volume = uniform([0.8, 0.4, 0.2]);
+    // Lit by what comes from everywhere, so that all of it is as bright.
+    let lit = Shading {
+        ambient: DVec3::ONE,
+        lights: Vec::new(),
+        directions: Arc::new(Directions::normals(&volume)),
+        ..load("lit-fur", &[]).shading.unwrap()
+    };
+    let volume = Arc::new(Pyramid::build(volume));
     // Rays that are alone, and in several parts of the shell at once.
-    for name in ["fog-torus", "table1/teapot-bust"] {
-        let scene = Scene {
-            volume: volume.clone(),
-            shading: None,
-            solids: [].into(),
-            ..load(name, &["volume.opacity_distance=0.03"])
-        };
-        let [early, full] = [0.1, 0.0].map(|end_below| {
-            let scene =
-                Arc::new(Scene { end_below, skips: Skips::without(&[Skip::EvenSpace]), ..scene.clone() });
-            Watched::prepare("shell", &scene).render(&scene.view).image.rgba
-        });
-        let mut opaque = 0;
-        for (early, full) in early.iter().zip(&full) {
-            let off = (0..4).map(|i| (early[i] - full[i]).abs()).fold(0.0, f32::max);
-            assert!(off <= 0.1, "{name}: {early:?} {full:?}");
-            if full[3] > 1.0 - 1e-5 {
-                opaque += 1;
-                // Not by 0.1: of one colour nothing is missed. Sums of steps, whose colours are those of texels to 2^-20, are off by some
-                // units of 2^-24, and what came last is more than 1e-3 of them: the part of 0.1 that is filled up is off by 1e-5 + 2e-7.
-                assert!(off <= 2.1e-5, "{name}: {early:?} {full:?}");
+    for (name, overlaps) in [("fog-torus", false), ("table1/teapot-bust", true)] {
+        for shading in [None, Some(lit.clone())] {
+            let what = format!("{name}, lit {}", shading.is_some());
+            let scene = Scene {
+                volume: volume.clone(),
+                shading,
+                solids: [].into(),
+                skips: Skips::without(&[Skip::EvenSpace]),
+                ..load(name, &["volume.opacity_distance=0.03"])
+            };
+            let [early, full] = early_and_full(&scene);
+            assert_eq!(early.report.counts["pixels_overlapping"] > 300, overlaps, "{what}");
+            let mut opaque = 0;
+            for (early, full) in early.image.rgba.iter().zip(&full.image.rgba) {
+                // The colour is at most 1.
+                assert!(off(early, full) <= 0.1, "{what}: {early:?} {full:?}");
+                if full[3] > 1.0 - 1e-5 {
+                    opaque += 1;
+                    // Of one colour nothing is missed but the 1e-5 that is let through. Sums of up to a thousand steps of one sign, each
+                    // off by 2^-20 of itself for its texel, differ by that at most, as do the quotients of sums above 2^-10 which are
+                    // off by units of 2^-24: some 2^-13, of a tenth.
+                    assert!(off(early, full) <= 4e-5, "{what}: {early:?} {full:?}");
+                }
             }
+            assert!(opaque > 300, "{what}: {opaque}");
         }
-        assert!(opaque > 300, "{name}: {opaque}");
+    }
+}
+
+#[test]
+fn a_ray_that_has_seen_all_is_not_filled_up() {
+    // Straight down through a layer that lets 0.0995 through, so that less than a tenth is left in the last five thousandths alone:
+    // 0.1 (ln 2) / opacity_distance = -ln 0.0995.
+    let base = "base = { colour = [0, 1, 0] }";
+    for (base, behind) in [("", [0.0; 4]), (base, [0.0, 1.0, 0.0, 1.0])] {
+        let text = format!(
+            "{base}
+            mesh = {{ generator = 'plane', segments = 3 }}
+            shell = {{ thickness = 0.1 }}
+            volume = {{ recipe = 'volumes/fog.toml', opacity_distance = 0.030037 }}
+            camera = {{ eye = [0.1, 20, 0.1], target = [0.1, 0, 0.1], up = [0, 0, -1], fov = 2 }}
+            image = {{ size = [64, 64] }}"
+        );
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR"));
+        let scene = scene::parse("layer", &text, folder).unwrap_or_else(|error| panic!("{error:?}")).scene;
+        for colour in [[1.0, 0.0, 0.0], [0.2, 0.0, 0.9]] {
+            let volume = Arc::new(Pyramid::build(uniform(colour)));
+            let [early, full] = early_and_full(&Scene { volume, ..scene.clone() });
+            let mut same = 0;
+            for (early, full) in early.image.rgba.iter().zip(&full.image.rgba) {
+                // The path is longer away from the middle, by 2e-4.
+                for i in 0..4 {
+                    let in_front = [colour[0], colour[1], colour[2], 1.0][i];
+                    let expected = 0.9005 * in_front + 0.0995 * behind[i];
+                    assert!((full[i] - expected).abs() <= 1e-4, "{behind:?}: {full:?}");
+                }
+                assert!(off(early, full) <= 0.1, "{behind:?}: {early:?} {full:?}");
+                same += u32::from(off(early, full) <= 1e-6);
+            }
+            // Of those whose last tetrahedron is thinner than that what is behind is not known.
+            assert!(same >= 64 * 64 * 9 / 10, "{behind:?}: {same}");
+        }
     }
 }
 

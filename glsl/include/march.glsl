@@ -14,15 +14,6 @@ bool is_saturated(Light light) {
     return transmittance(light.gathered) <= SATURATED;
 }
 
-// Of a ray that ends there: what is behind is taken for more of what came since `before`, and lies where that ended: it is nearer to that
-// than to nothing.
-void fill_up(inout Light light, Light before, float end) {
-    vec4 since = max(light.gathered.rgba - before.gathered.rgba, vec4(0.0));
-    if (!is_saturated(light) || since.a == 0.0) return;
-    light.depth += transmittance(light.gathered) * end;
-    lay_behind(light.gathered, since / since.a);
-}
-
 #ifdef LIT
 #include "shade.glsl"
 #else
@@ -76,6 +67,16 @@ float rise_since_last(float begin, float size, float extinction, bool is_first) 
     last_extinction = here;
     last_end = begin + size;
     return is_first || here == 0.0 ? 0.0 : 0.5 - 0.5 * min(before / here, 3.0);
+}
+
+// Of a ray that is saturated before its end: what is behind is taken for more of what came since `before`, or of all where that is so
+// little that its rounding counts, and lies where that ended. It is nearer to that than to nothing.
+void fill_up(inout Light light, Light before) {
+    if (!is_saturated(light)) return;
+    vec4 since = light.gathered.rgba - before.gathered.rgba;
+    if (since.a < 0.0009765625) since = light.gathered.rgba;
+    light.depth += transmittance(light.gathered) * last_end;
+    lay_behind(light.gathered, since / since.a);
 }
 
 #if defined(WALKS) && defined(LIT)

@@ -58,7 +58,7 @@ pub struct SceneResults {
     pub own_samples: Option<u32>,
     /// One for each method and plan.
     pub curves: Vec<Curve>,
-    /// In the order of the sweep's settings.
+    /// In the order of the sweep's settings; that with the scene's own samples comes last.
     pub points: Vec<Point>,
 }
 

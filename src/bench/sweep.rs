@@ -212,8 +212,7 @@ impl Sweep {
             exact: file.plans.get_ref().exact,
         };
         if levels.steps.is_empty() && levels.samples.is_empty() && !levels.exact {
-            let message =
-                "[plans] is empty, expected steps under `default`, samples under `paper`, or `exact = true`";
+            let message = "[plans] has no level, expected steps under `default`, samples under `paper`, or `exact = true`";
             return Err(text.error(file.plans.span(), message));
         }
         let methods: Vec<&str> = match &file.methods {

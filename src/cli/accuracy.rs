@@ -96,13 +96,13 @@ impl Choice {
     pub fn accuracy(self, scene: &Scene, image: &Image, setup: &Setup<'_>) -> Result<Accuracy> {
         let Self {
             max_error,
-            choice: pilot::Choice { trial: Trial { march, error }, measured, .. },
+            choice: pilot::Choice { trial: Trial { march, error }, measured, end_below },
             verify,
             cache,
             warning: _,
         } = self;
         let verified = verify.then(|| error_of(scene, image, cache.as_deref(), setup)).transpose()?;
-        Ok(Accuracy { max_error, march, estimate: error, measured, verified })
+        Ok(Accuracy { max_error, march, end_below, estimate: error, measured, verified })
     }
 }
 
@@ -113,6 +113,8 @@ pub struct Accuracy {
     max_error: f64,
     /// What was chosen.
     march: March,
+    /// Where its rays end: the scene's, unless that was too much.
+    end_below: f64,
     /// Its RMSE, estimated from some of the pixels.
     estimate: Estimate,
     /// Marches measured to choose it; 0 where all was known.
@@ -129,14 +131,16 @@ impl Accuracy {
 
     /// A line for people.
     pub fn told(&self) -> String {
-        let Self { max_error, march, estimate: Estimate { rmse, standard_error }, verified, .. } = self;
+        let Self {
+            max_error, march, end_below, estimate: Estimate { rmse, standard_error }, verified, ..
+        } = self;
         let verified = match verified {
             Some(rmse) if self.is_kept() => format!("; verified: {rmse:.2e}"),
             Some(rmse) => format!("; but it is {rmse:.2e}"),
             None => String::new(),
         };
         format!(
-            "{march}: RMSE {rmse:.2e} estimated, give or take {standard_error:.0e}, of {max_error:e}{verified}\n"
+            "{march}, rays end below {end_below:.1e}: RMSE {rmse:.2e} estimated, give or take {standard_error:.0e}, of {max_error:e}{verified}\n"
         )
     }
 }

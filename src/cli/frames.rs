@@ -252,7 +252,10 @@ fn render(arguments: &Arguments, line: &Arc<FrameLine>, interrupt: &Interrupt) -
     if arguments.accuracy.is_used() {
         return Err(Error::Usage {
             message: "--max-error chooses the march of one picture, not of many frames".into(),
-            help: Some("choose it for one frame, and give its step by -D march.step=S".into()),
+            help: Some(
+                "choose it for one frame, and give its step and ends by -D march.step=S -D march.end_below=E"
+                    .into(),
+            ),
         });
     }
     if arguments.explain {

@@ -5,10 +5,10 @@ use std::panic::resume_unwind;
 use std::path::Path;
 use std::thread::{self, ScopedJoinHandle};
 
+use mesoshell::Result;
 use mesoshell::frame::{Stage, Stopwatch};
 use mesoshell::method::{Entry, Opened, Setup};
 use mesoshell::scene::{self, Loaded, Sizes};
-use mesoshell::{Error, Result};
 
 /// A volume of no more texels is computed in a fraction of a second: whether the device admits it may be asked after that.
 const QUICKLY_COMPUTED: u64 = 1 << 22;
@@ -16,16 +16,17 @@ const QUICKLY_COMPUTED: u64 = 1 << 22;
 /// A method that is opened on another thread.
 struct Opening<'scope> {
     thread: Cell<Option<ScopedJoinHandle<'scope, Result<Box<dyn Opened>>>>>,
-    opened: OnceCell<Result<Box<dyn Opened>>>,
+    opened: OnceCell<Box<dyn Opened>>,
 }
 
 impl Opening<'_> {
-    /// Waits for it.
-    fn opened(&self) -> &Result<Box<dyn Opened>> {
-        self.opened.get_or_init(|| {
-            let thread = self.thread.take().expect("asked for once");
-            thread.join().unwrap_or_else(|panic| resume_unwind(panic))
-        })
+    /// Waits for it; `None` where that has failed before.
+    fn opened(&self) -> Result<Option<&dyn Opened>> {
+        if let Some(thread) = self.thread.take() {
+            let opened = thread.join().unwrap_or_else(|panic| resume_unwind(panic))?;
+            self.opened.get_or_init(|| opened);
+        }
+        Ok(self.opened.get().map(|opened| &**opened))
     }
 }
 
@@ -44,26 +45,24 @@ pub fn open_and_load(
     thread::scope(|scope| {
         let opening =
             Opening { thread: Cell::new(Some(scope.spawn(|| (entry.open)(setup)))), opened: OnceCell::new() };
-        let asked = Cell::new(None);
+        let put_off = Cell::new(None);
         let admit = |sizes: &Sizes| {
             let sizes = Sizes { picture: size.unwrap_or(sizes.picture), ..*sizes };
-            asked.set(Some(sizes));
             if sizes.volume.map(u64::from).iter().product::<u64>() <= QUICKLY_COMPUTED {
+                put_off.set(Some(sizes));
                 return Ok(());
             }
-            // What keeps it from being opened is told below.
-            opening.opened().as_ref().map_or(Err(Error::Interrupted), |opened| opened.admit(&sizes))
+            opening.opened()?.map_or(Ok(()), |opened| opened.admit(&sizes))
         };
         let loaded = scene::load_if(path, overrides, setup.progress.as_ref(), &admit);
         setup.progress.stage("opening the device");
         let mut watch = Stopwatch::start();
-        opening.opened();
-        watch.lap("open");
-        let opened = opening.opened.into_inner().expect("opened just now")?;
-        if let Some(sizes) = asked.get() {
+        if let (Some(opened), Some(sizes)) = (opening.opened()?, put_off.get()) {
             opened.admit(&sizes)?;
         }
+        watch.lap("open");
         let waited = watch.finish().remove(0);
-        Ok((opened, loaded?, waited))
+        let loaded = loaded?;
+        Ok((opening.opened.into_inner().expect("else the scene was not let through"), loaded, waited))
     })
 }

@@ -91,12 +91,12 @@ const PATIENCE: Duration = Duration::from_millis(400);
 /// The first submission of a target's first draw has one of so many parts of all vertices.
 const FIRST_PART: u64 = 16;
 /// The next may be larger than the one before it by this factor.
-const MOST_GROWTH: f64 = 16.0;
+const MOST_GROWTH: f64 = 8.0;
 
 /// Draws, copies a target of the host's to its memory, and waits for all of it. Device times
 /// are `None` where the device has no timestamps.
 ///
-/// The work is submitted in parts of about a quarter of a second, judged by the part before, and the first one by the target's last
+/// The work is submitted in parts that take [`PATIENCE`], judged by the part before, and the first one by the target's last
 /// draw: at the end of each, processors wait for one another. Where they end makes no difference to the picture.
 ///
 /// # Errors

@@ -113,7 +113,7 @@ impl Pipeline {
     /// Builds several at once, on several processors, which takes drivers milliseconds each.
     ///
     /// # Errors
-    /// As [`Pipeline::new`].
+    /// As [`Pipeline::new`]; of several, any.
     ///
     /// # Panics
     /// As [`Pipeline::new`].
@@ -122,8 +122,8 @@ impl Pipeline {
         target: &Target,
         infos: [Option<PipelineInfo<'_>>; N],
     ) -> Result<[Option<Self>; N]> {
-        let (kind, pass) = (TargetKind::of(target), target.clearing);
         assert!(Arc::ptr_eq(gpu, &target.gpu), "the target is another device's");
+        let (kind, pass) = (TargetKind::of(target), target.clearing);
         let build =
             |info: Option<PipelineInfo<'_>>| info.map(|info| Self::build(gpu, kind, pass, &info)).transpose();
         let pipelines = infos.into_par_iter().map(build).collect::<Result<Vec<_>>>()?;
@@ -142,6 +142,8 @@ impl Pipeline {
         Self::build(gpu, TargetKind::of(target), target.clearing, info)
     }
 
+    /// `pass` is of the same device, and outlives the call. Several threads may be here at once: nothing that Vulkan is given here
+    /// must be in the hands of one thread alone.
     fn build(
         gpu: &Arc<Gpu>,
         kind: TargetKind,

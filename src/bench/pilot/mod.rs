@@ -53,7 +53,7 @@ pub struct Choice {
     /// How many marches were measured for it now; the others were known.
     pub measured: usize,
     /// The scene's [`Scene::end_below`], or the default where that alone might take too much of the error.
-    end_below: f64,
+    pub end_below: f64,
 }
 
 impl Choice {
@@ -63,11 +63,13 @@ impl Choice {
     }
 }
 
-/// The part of the error accepted above which a scene's `end_below` is not kept.
-const MOST_ENDED: f64 = 1.0 / 3.0;
+/// A scene's `end_below` is not kept where so many times that is above the error accepted. One that followed from the error would
+/// make trials for one error worthless for another.
+const LEAST_BELOW: f64 = 3.0;
 
 /// The coarsest march by which `method` renders the scene's own view with an RMSE (linear premultiplied RGBA, all pixels) of at
-/// most `max_error`; `scene.march` is not read, and `scene.end_below` is the default where it is above a third of that. Known trials are taken from `cache`, a folder, and kept there.
+/// most `max_error`; `scene.march` is not read, and `scene.end_below` is the default where it is above a third of that. Known trials
+/// are taken from `cache`, a folder, and kept there.
 ///
 /// # Errors
 /// [`Error::Usage`] where no march meets the error; as [`Method::render`](crate::method::Method::render); [`Error::Output`]
@@ -79,11 +81,8 @@ pub fn choose(
     cache: Option<&Path>,
     setup: &Setup<'_>,
 ) -> Result<Choice> {
-    let end_below = if scene.end_below > MOST_ENDED * max_error {
-        END_BELOW.min(scene.end_below)
-    } else {
-        scene.end_below
-    };
+    let is_kept = LEAST_BELOW * scene.end_below <= max_error;
+    let end_below = if is_kept { scene.end_below } else { scene.end_below.min(END_BELOW) };
     let scene = &Scene { end_below, ..scene.clone() };
     let mut trials = Trials::load(cache, fingerprint(scene, method, setup)?);
     let mut sample: Option<Sample> = None;
