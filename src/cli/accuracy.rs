@@ -47,8 +47,12 @@ impl Arguments {
                 "leave out --max-error, or --method",
             );
         }
-        let is_of_march =
-            |define: &&String| define.split(['.', '=']).next().is_some_and(|key| key.trim() == "march");
+        // Where rays end is not chosen, but for a limit.
+        let is_of_march = |define: &&String| {
+            let key = define.split('=').next().unwrap_or_default();
+            let mut parts = key.split('.').map(str::trim);
+            parts.next() == Some("march") && parts.next() != Some("end_below")
+        };
         match define.iter().find(is_of_march) {
             Some(define) => usage(
                 format!("--max-error chooses the march, and so does -D {define}"),

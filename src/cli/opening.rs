@@ -55,7 +55,9 @@ pub fn open_and_load(
             opening.opened()?.map_or(Ok(()), |opened| opened.admit(&sizes))
         };
         let loaded = scene::load_if(path, overrides, setup.progress.as_ref(), &admit);
-        setup.progress.stage("opening the device");
+        if loaded.is_ok() {
+            setup.progress.stage("opening the device");
+        }
         let mut watch = Stopwatch::start();
         if let (Some(opened), Some(sizes)) = (opening.opened()?, put_off.get()) {
             opened.admit(&sizes)?;
