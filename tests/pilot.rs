@@ -130,6 +130,13 @@ fn the_command_line_tells_estimate_and_error() {
         assert!((estimate - verified).abs() < 1e-7 && verified <= 1e-3, "{accuracy:#}");
         assert_eq!(accuracy["measured"] == 0, is_known, "{accuracy:#}");
     }
+    for (asked, told) in [("3e-4", 3e-4), ("0.1", scene::END_BELOW)] {
+        let end_below = format!("march.end_below={asked}");
+        let output = render(folder.path(), &["--max-error", "1e-3", "-D", &end_below]);
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        let json: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+        assert_eq!(json["accuracy"]["end_below"].as_f64(), Some(told), "{json:#}");
+    }
     // Nobody asked: nothing is said.
     let plain = render(folder.path(), &[]);
     assert!(plain.status.success() && !String::from_utf8_lossy(&plain.stdout).contains("accuracy"));

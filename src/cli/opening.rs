@@ -13,9 +13,12 @@ use mesoshell::scene::{self, Loaded, Sizes};
 /// A volume of no more texels is computed in a fraction of a second: whether the device admits it may be asked after that.
 const QUICKLY_COMPUTED: u64 = 1 << 22;
 
+/// What comes of opening a method on another thread.
+type Thread<'scope> = ScopedJoinHandle<'scope, Result<Box<dyn Opened>>>;
+
 /// A method that is opened on another thread.
 struct Opening<'scope> {
-    thread: Cell<Option<ScopedJoinHandle<'scope, Result<Box<dyn Opened>>>>>,
+    thread: Cell<Option<Thread<'scope>>>,
     opened: OnceCell<Box<dyn Opened>>,
 }
 

@@ -96,7 +96,7 @@ const MOST_GROWTH: f64 = 8.0;
 /// Draws, copies a target of the host's to its memory, and waits for all of it. Device times
 /// are `None` where the device has no timestamps.
 ///
-/// The work is submitted in parts that take [`PATIENCE`], judged by the part before, and the first one by the target's last
+/// The work is submitted in parts that take less than half a second, judged by the part before, and the first one by the target's last
 /// draw: at the end of each, processors wait for one another. Where they end makes no difference to the picture.
 ///
 /// # Errors
