@@ -74,7 +74,7 @@ float rise_since_last(float begin, float size, float extinction, bool is_first) 
 void fill_up(inout Light light, Light before) {
     if (!is_saturated(light)) return;
     vec4 since = light.gathered.rgba - before.gathered.rgba;
-    if (since.a < 0.0009765625) since = light.gathered.rgba;
+    if (since.a < 1.0 / 1024.0) since = light.gathered.rgba;
     light.depth += transmittance(light.gathered) * last_end;
     lay_behind(light.gathered, since / since.a);
 }

@@ -33,7 +33,8 @@ const REACH: f64 = 2.0;
 pub fn levels(full: &Volume, geometry: &Geometry) -> Vec<Volume> {
     let depths = &depths(full);
     let visibility = Visibility::from_above(full.size, depths, geometry.edges(0)[2]);
-    // One after the other, as each holds up to one and a half times as much as the volume again. From outside, u and v are seen from either side, w from above.
+    // One after the other, as each holds up to one and a half times as much as the volume again. From outside, u and v are seen from
+    // either side, w from above.
     let seen = [
         beams_along(full, depths, geometry, 0, Some(&visibility), Passage::of_both_sides),
         beams_along(full, depths, geometry, 1, Some(&visibility), Passage::of_both_sides),
